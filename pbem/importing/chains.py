@@ -10,15 +10,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Complex
+from pbem.arrays import Complex, Integer
 from pbem.geometry.curve import Leg
+from pbem.geometry.shape import WIDEST_ARC
 
 Edge = tuple[int, int]
 # Part of the mesh's extent by which nodes may be off the line or the circle that they are said to lie on.
 OFF = 1e-6
 # Largest angle (degrees) between the edges of a circle, if the mesh says that they are of one entity, and if not: a
-# regular polygon with fewer corners stays one.
-WIDEST, WIDEST_UNTOLD = 46.0, 31.0
+# regular polygon with fewer corners stays one. Between the parts of edges of higher order, which are known.
+WIDEST, WIDEST_UNTOLD, WIDEST_BENT = 46.0, 31.0, 91.0
+# Lengths of edges are equal up to this part of them.
+EQUAL = 1e-3
+# An edge of higher order is an arc if its nodes are off it by no more than this part of its rise.
+ROUND = 0.15
 
 
 @dataclass(frozen=True)
@@ -28,9 +33,53 @@ class Chain:
     nodes: tuple[int, ...]
     entities: tuple[int, ...]
 
+    def place(self, nodes: Mapping[int, complex], between: Mapping[Edge, tuple[int, ...]]) -> _Path:
+        """The chain by the places of its nodes, among them those between the ends of edges."""
+        inner = []
+        for a, b in itertools.pairwise(self.nodes):
+            own = between.get((min(a, b), max(a, b)), ())
+            inner.append(np.array([nodes[each] for each in (own if a < b else own[::-1])], dtype=complex))
+        return _Path(np.array([nodes[node] for node in self.nodes]), np.array(self.entities), inner)
+
     @property
     def closed(self) -> bool:
         return self.nodes[0] == self.nodes[-1]
+
+
+@dataclass(frozen=True)
+class _Path:
+    """points (n,): ends of edges; entities (n - 1,): of each edge; inner: places of the nodes between its ends."""
+
+    points: Complex
+    entities: Integer
+    inner: list[Complex]
+
+    def part(self, first: int, last: int) -> _Path:
+        """The edges between two points."""
+        return _Path(self.points[first:last + 1], self.entities[first:last], self.inner[first:last])
+
+    def turn_to(self, first: int) -> _Path:
+        """The same closed path from another point on."""
+        points = np.concatenate([self.points[first:-1], self.points[:first + 1]])
+        return _Path(points, np.roll(self.entities, -first), self.inner[first:] + self.inner[:first])
+
+    @property
+    def edges(self) -> int:
+        """Number of edges."""
+        return len(self.inner)
+
+    @property
+    def fine(self) -> Complex:
+        """All points, those between the ends of edges among them."""
+        parts = [part for start, own in zip(self.points, self.inner, strict=False) for part in ([start], own)]
+        return np.concatenate([*parts, self.points[-1:]])
+
+    def is_bent(self, off: float) -> bool | None:
+        """Whether all edges are known to be curved; None if nothing is known of any."""
+        known = [len(own) > 0 for own in self.inner]
+        if not any(known):
+            return None
+        return all(known) and not any(_is_straight(self.part(k, k + 1).fine, off) for k in range(self.edges))
 
 
 def link(edges: Sequence[Edge], entities: Mapping[Edge, int], corners: set[int]) -> list[Chain]:
@@ -60,54 +109,71 @@ def link(edges: Sequence[Edge], entities: Mapping[Edge, int], corners: set[int])
     return chains
 
 
-def fit_legs(chain: Chain, nodes: Mapping[int, complex], corners: set[int], extent: float) -> list[Leg]:
-    """The legs of a chain, as long as can be, with an element for each edge.
+def fit_legs(
+    chain: Chain, nodes: Mapping[int, complex], between: Mapping[Edge, tuple[int, ...]], corners: set[int],
+    extent: float,
+) -> list[Leg]:
+    """The legs of a chain, as long as can be, with an element for each edge, or more of those that turn by too much.
 
-    A circle is four legs, from the angle 0 on.
+    nodes: places by tag; between: tags of the nodes of edges of higher order, by the edges' ends. A circle is four
+    legs, from the angle 0 on.
     """
-    points = np.array([nodes[node] for node in chain.nodes])
-    entities = np.array(chain.entities)
+    path = chain.place(nodes, between)
     off = OFF * extent
     if chain.closed:
         if chain.nodes[0] not in corners:
-            first = _run(points, entities, 0, off)
-            if 0 < first < len(points) - 1:
+            first = _run(path, 0, off)
+            if 0 < first < path.edges:
                 # Where the first run ends another one begins, whatever the node where the chain was begun.
-                points = np.concatenate([points[first:-1], points[:first + 1]])
-                entities = np.roll(entities, -first)
-        circle = _fit_circle(points[:-1], off)
-        if circle is not None and _is_round(points, entities):
-            return _draw_circle(*circle, len(points) - 1, extent)
+                path = path.turn_to(first)
+        circle = _fit_circle(path.fine[:-1], off)
+        if circle is not None and _is_round(path, off):
+            return _draw_circle(*circle, path.edges, extent)
     legs = []
     first = 0
-    while first < len(points) - 1:
-        last = _run(points, entities, first, off)
-        legs.append(_make_leg(points[first:last + 1], off))
+    while first < path.edges:
+        last = _run(path, first, off)
+        legs += _make_legs(path.part(first, last), off)
         first = last
     return legs
 
 
-def _run(points: Complex, entities: np.ndarray, first: int, off: float) -> int:
+def _run(path: _Path, first: int, off: float) -> int:
     """The last point of the longest straight or circular run that begins at a point."""
-    straight = first + 1
-    while straight + 1 < len(points) and _is_straight(points[first:straight + 2], off):
+    straight = first
+    while straight < path.edges and _is_straight(path.part(first, straight + 1).fine, off):
         straight += 1
-    if straight > first + 1 or straight == len(points) - 1:
-        return straight
+    bent = path.part(first, first + 1).is_bent(off)
+    if straight > first + 1 or straight == path.edges or bent is False:
+        return max(straight, first + 1)
     last = first + 1
-    for end in range(first + 2, len(points)):
-        part, own = points[first:end + 1], entities[first:end]
-        if abs(part[0] - part[-1]) <= off or not _is_round(part, own):
+    for end in range(first + 2 if bent is None else first + 1, path.edges + 1):
+        part = path.part(first, end)
+        if abs(part.points[0] - part.points[-1]) <= off or not _is_round(part, off):
             break
-        if len(part) > 3 and _fit_circle(part, off) is None:
+        if len(part.fine) > 3 and _fit_circle(part.fine, off) is None:
             break
         last = end
-    edges = last - first
-    lengths = np.abs(np.diff(points[first:last + 1]))
-    told = entities[first] != 0 and (entities[first:last] == entities[first]).all()
-    if edges > 2 or (edges == 2 and told and abs(lengths[0] - lengths[1]) <= 1e-3 * lengths[0]):
-        return last
-    return first + 1
+    return last if bent or _is_arc(path.part(first, last)) else first + 1
+
+
+def _is_arc(path: _Path) -> bool:
+    """Whether edges whose ends lie on a circle are meant to be an arc: any three edges do that are alike on both sides,
+    such as those of a gable."""
+    entities = path.entities
+    if (entities[0] != 0) and (entities == entities[0]).all() and path.edges == 2:
+        return _are_equal(path.points)
+    if path.edges < 3:
+        return False
+    if ((entities[1:] == entities[:-1]) & (entities[1:] != 0)).any():
+        return True
+    # Lines that are one edge each stay straight; of others nothing is known.
+    return not (entities != 0).all() and (path.edges > 3 or _are_equal(path.points))
+
+
+def _are_equal(points: Complex) -> bool:
+    lengths = np.abs(np.diff(points))
+    return bool(np.ptp(lengths) <= EQUAL * lengths[0])
 
 
 def _is_straight(points: Complex, off: float) -> bool:
@@ -118,12 +184,15 @@ def _is_straight(points: Complex, off: float) -> bool:
     return bool((np.abs(local.imag) * abs(along) <= off).all() and (np.diff(local.real) > 0).all())
 
 
-def _is_round(points: Complex, entities: np.ndarray) -> bool:
+def _is_round(path: _Path, off: float) -> bool:
     """Whether the edges turn by the same sign everywhere, and by less than a polygon's would."""
-    steps = np.diff(points)
+    bent = path.is_bent(off)
+    if bent is False:
+        return False
+    steps = np.diff(path.fine)
     turns = np.degrees(np.angle(steps[1:] / steps[:-1]))
-    told = bool(((entities[1:] == entities[:-1]) & (entities[1:] != 0)).any())
-    widest = WIDEST if told else WIDEST_UNTOLD
+    told = bool(((path.entities[1:] == path.entities[:-1]) & (path.entities[1:] != 0)).any())
+    widest = WIDEST_BENT if bent else WIDEST if told else WIDEST_UNTOLD
     return bool((np.abs(turns) <= widest).all() and ((turns > 0).all() or (turns < 0).all()))
 
 
@@ -148,6 +217,7 @@ def _draw_circle(center: complex, radius: float, edges: int, extent: float) -> l
     digits = 12 - math.ceil(math.log10(max(extent, abs(center))))
     center = complex(round(center.real, digits) + 0.0, round(center.imag, digits) + 0.0)
     radius = round(radius, digits)
+    edges = max(edges, math.ceil(360 / WIDEST_ARC))
     counts = [edges // 4 + (quarter < edges % 4) for quarter in range(4)]
     points = [center + radius * direction for direction in (1, 1j, -1, -1j, 1)]
     return [
@@ -155,12 +225,30 @@ def _draw_circle(center: complex, radius: float, edges: int, extent: float) -> l
     ]
 
 
-def _make_leg(points: Complex, off: float) -> Leg:
-    start, end, edges = complex(points[0]), complex(points[-1]), len(points) - 1
-    if edges == 1 or _is_straight(points, off):
-        return Leg(start, end, edges)
+def _make_legs(path: _Path, off: float) -> list[Leg]:
+    """The legs of a run: one, or several of an edge of higher order that is no arc."""
+    start, end, fine = complex(path.points[0]), complex(path.points[-1]), path.fine
+    if len(fine) == 2 or _is_straight(fine, off):
+        return [Leg(start, end, path.edges)]
+    # The middle of an edge of higher order is on it whether it has a node there or not.
+    points = fine if path.edges > 1 else np.array([start, _find_middle(fine), end])
     fitted = _fit_circle(points, math.inf)
-    assert fitted is not None
+    if fitted is None or not _are_near(fine, *fitted):
+        return [Leg(complex(a), complex(b), 1) for a, b in itertools.pairwise(fine)]
     rays = points - fitted[0]
     turn = float(np.angle(rays[1:] / rays[:-1]).sum())
-    return Leg(0j, 0j, edges, center=0j, sweep=turn).tie(start, end)
+    elements = max(path.edges, math.ceil(abs(math.degrees(turn)) / WIDEST_ARC - 1e-6))
+    return [Leg(0j, 0j, elements, center=0j, sweep=turn).tie(start, end)]
+
+
+def _find_middle(fine: Complex) -> complex:
+    """The middle of an edge of higher order, by the polynomial through its nodes."""
+    t = np.linspace(-1, 1, len(fine))
+    return complex(np.linalg.solve(np.vander(t), fine)[-1])
+
+
+def _are_near(points: Complex, center: complex, radius: float) -> bool:
+    """Whether points are on an arc, but for a part of its rise above its chord."""
+    chord = points[-1] - points[0]
+    rise = np.abs(((points - points[0]) / chord).imag).max() * abs(chord)
+    return bool((np.abs(np.abs(points - center) - radius) <= ROUND * rise).all())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from pathlib import Path
 
 from pbem.geometry.shape import LARGEST
@@ -14,6 +15,8 @@ DELIMITERS = ",;\t|"
 # Names of columns, in small letters.
 SEGMENT = ("x1", "y1", "x2", "y2")
 IDENTITIES = ("id", "name", "trace", "fid", "trace_id", "line")
+# Words in names of columns that hold the coordinates of one axis.
+AXES = {"x": {"x", "east", "easting", "lon", "longitude"}, "y": {"y", "north", "northing", "lat", "latitude"}}
 EXPECTED = "rows x1,y1,x2,y2 or id,x,y, with or without a header that names them"
 
 
@@ -27,7 +30,7 @@ def read_csv(path: Path, text: str) -> Reading:
     header = [cell.lower() for cell in rows[0][1]]
     columns = _read_header(header)
     by_position = columns is None and len(rows) > 1 and not _is_data(rows[0][1]) and _is_data(rows[1][1])
-    if by_position and len(rows[0][1]) == len(rows[1][1]):
+    if by_position and len(rows[0][1]) == len(rows[1][1]) and _agrees(header):
         named = list_names([show(cell) for cell in rows[0][1]])
         reading.notes.append(f"Columns {named} are taken as {'x1, y1, x2, y2' if len(header) == 4 else 'id, x, y'}.")
         rows = rows[1:]
@@ -85,6 +88,17 @@ def _read_header(names: list[str]) -> dict[str, int] | None:
     return None
 
 
+def _agrees(names: list[str]) -> bool:
+    """Whether no name says that its column holds coordinates of another axis than its position does."""
+    axes = ("x", "y", "x", "y") if len(names) == 4 else (None, "x", "y")
+    for name, axis in zip(names, axes, strict=True):
+        words = set(re.findall("[a-z]+", name))
+        told = [each for each, known in AXES.items() if words & known]
+        if len(told) == 1 and told[0] != axis:
+            return False
+    return True
+
+
 def _is_data(cells: list[str]) -> bool:
     """Whether a first row can be one of data: four numbers, or a name and two of them."""
     if len(cells) == 4:
@@ -94,7 +108,8 @@ def _is_data(cells: list[str]) -> bool:
 
 def _parse(cell: str) -> float | None:
     try:
-        return float(cell)
+        # Python's own numbers may have underlines, which no table has.
+        return None if "_" in cell else float(cell)
     except ValueError:
         return None
 

@@ -25,6 +25,8 @@ OF_POLYLINES = ("90", "70", "43", "38", "39", "10")
 OLD = "AC1009"
 # Parts of a circle.
 QUARTERS = 4
+# Flag of a vertex that is a control point of a spline.
+FRAME = 16
 
 
 def read_dxf(path: Path) -> Reading:
@@ -146,7 +148,7 @@ def _read_entity(entity: Any, kind: str) -> tuple[list[Leg] | None, bool]:
         ends = [entity.dxf.start, entity.dxf.end]
         return _chain([(complex(point.x, point.y), 0.0) for point in ends]), any(point.z != 0 for point in ends)
     if kind == "POLYLINE" and entity.is_3d_polyline:
-        points = [vertex.dxf.location for vertex in entity.vertices]
+        points = [vertex.dxf.location for vertex in _list_drawn(entity)]
         if entity.is_closed and points:
             points.append(points[0])
         return _chain([(complex(point.x, point.y), 0.0) for point in points]), any(point.z != 0 for point in points)
@@ -188,12 +190,17 @@ def _list_vertices(entity: Any, kind: str) -> list[tuple[complex, float]]:
     else:
         vertices = [
             (complex(vertex.dxf.location.x, vertex.dxf.location.y), float(vertex.dxf.get("bulge", 0.0)))
-            for vertex in entity.vertices
+            for vertex in _list_drawn(entity)
         ]
     closed = entity.closed if kind == "LWPOLYLINE" else entity.is_closed
     if closed and vertices:
         vertices.append((vertices[0][0], 0.0))
     return vertices
+
+
+def _list_drawn(entity: Any) -> list[Any]:
+    """The vertices that a polyline (POLYLINE) runs through: those that a spline was drawn to are only its frame."""
+    return [vertex for vertex in entity.vertices if not int(vertex.dxf.get("flags", 0)) & FRAME]
 
 
 def _turn(first: float, last: float) -> float:

@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
 from pbem.errors import Fault, PbemError
 from pbem.geometry.curve import Leg
 from pbem.geometry.shape import Outline, outline
@@ -50,13 +54,13 @@ def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Im
         return make_map_case(path, _read_traces(grid), options, command)
     _refuse(path, options)
     left_out: list[str] = []
-    regions = _name_regions(grid, left_out)
+    regions, materials = _name_regions(grid, left_out)
     sides, entities = _find_sides(path, grid, regions, left_out)
     curves = _make_curves(grid, sides, entities)
     names = _name_curves(grid, curves)
-    tables = _make_tables(path, names, dict.fromkeys(regions.values()), options)
+    tables = _make_tables(path, names, materials, options)
     uses = Counter(side.use for _, side, _, _ in names)
-    summary = [f"regions: {len(set(regions.values()))} ({', '.join(dict.fromkeys(regions.values()))})"]
+    summary = [f"regions: {len(materials)} ({', '.join(materials)})"]
     summary += [
         f"{use}s: {uses[use]} ({', '.join(name for name, side, _, _ in names if side.use == use)})"
         for use in ("outer curve", "interface", "crack") if uses[use]
@@ -92,7 +96,7 @@ def _read_traces(grid: Grid) -> Reading:
     for group, edges in groups.items():
         usable = [edge for edge in edges if grid.nodes[edge[0]] != grid.nodes[edge[1]]]
         chains = link(usable, edges, set())
-        parts = tuple(tuple(fit_legs(chain, grid.nodes, set(), extent)) for chain in chains)
+        parts = tuple(tuple(fit_legs(chain, grid.nodes, grid.between, set(), extent)) for chain in chains)
         name = _choose_name(grid.names.get((1, group), f"line_{group}" if group else "lines"), taken)
         if parts:
             reading.traces.append(Trace(name, f"physical line {group}", parts))
@@ -115,29 +119,58 @@ def _choose_name(wanted: str, taken: set[str]) -> str:
     return name
 
 
-def _name_regions(grid: Grid, left_out: list[str]) -> dict[int, str]:
-    """Names of the regions by the numbers of their physical surfaces."""
+def _name_regions(grid: Grid, left_out: list[str]) -> tuple[list[str | None], dict[str, str]]:
+    """The region of every surface element, None without one; and the material of every region, by name.
+
+    A physical surface is one, or as many as it has parts that are not connected: all of one material.
+    """
     counts = Counter(cell.group for cell in grid.surfaces)
-    if set(counts) == {0}:
+    whole = set(counts) == {0}
+    if whole:
         grid.notes.append("No surface has a physical group: all are one region, 'body'.")
-        return {0: "body"}
-    if counts[0]:
+    elif counts[0]:
         left_out.append(f"{counts[0]} surface elements without a physical group")
+    parts = _number_parts(grid.surfaces)
     taken: set[str] = set()
-    return {
-        group: _choose_name(grid.names.get((2, group), f"surface_{group}"), taken) for group in sorted(counts) if group
-    }
+    names: dict[tuple[int, int], str] = {}
+    materials: dict[str, str] = {}
+    for group in sorted(group for group in counts if group or whole):
+        own = sorted({part for cell, part in zip(grid.surfaces, parts, strict=True) if cell.group == group})
+        name = _choose_name("body" if whole else grid.names.get((2, group), f"surface_{group}"), taken)
+        for number, part in enumerate(own, 1):
+            names[group, part] = name if len(own) == 1 else _choose_name(f"{name}.{number}", taken)
+            materials[names[group, part]] = name
+        if len(own) > 1:
+            what = "mesh" if whole else f"physical surface '{name}'"
+            grid.notes.append(f"The {what} has {len(own)} parts that are not connected: regions of one material.")
+    return [names.get((cell.group, part)) for cell, part in zip(grid.surfaces, parts, strict=True)], materials
+
+
+def _number_parts(surfaces: Sequence[Cell]) -> list[int]:
+    """For every surface element the number of its part: those of one group that are connected by edges."""
+    rows, columns = [], []
+    first: dict[tuple[int, Edge], int] = {}
+    for number, cell in enumerate(surfaces):
+        for a, b in zip(cell.corners, (*cell.corners[1:], cell.corners[0]), strict=True):
+            rows.append(number)
+            columns.append(first.setdefault((cell.group, _key(a, b)), number))
+    count = len(surfaces)
+    graph = sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    return list(csgraph.connected_components(graph, directed=False)[1].tolist())
 
 
 def _find_sides(
-    path: Path, grid: Grid, regions: Mapping[int, str], left_out: list[str]
+    path: Path, grid: Grid, regions: Sequence[str | None], left_out: list[str]
 ) -> tuple[dict[_Side, list[Edge]], dict[Edge, int]]:
-    """The edges that bound regions, or on which a physical line lies inside of one; and the entities of edges."""
+    """The edges that bound regions, or on which a physical line lies inside of one; and the entities of edges.
+
+    regions: of every surface element.
+    """
     around: dict[Edge, list[str]] = defaultdict(list)
-    for cell in grid.surfaces:
-        if cell.group in regions:
+    for cell, region in zip(grid.surfaces, regions, strict=True):
+        if region is not None:
             for a, b in zip(cell.corners, (*cell.corners[1:], cell.corners[0]), strict=True):
-                around[_key(a, b)].append(regions[cell.group])
+                around[_key(a, b)].append(region)
     faults = [
         Fault(f"the edge at {format_place(0.5 * (grid.nodes[a] + grid.nodes[b]))}",
               f"{len(owners)} surface elements at one edge", "two at most")
@@ -180,7 +213,7 @@ def _make_curves(
     # In the order of the groups' numbers, and edges without one last.
     order = sorted(sides, key=lambda side: (not side.group, side.group))
     return [
-        (side, fit_legs(chain, grid.nodes, corners, extent))
+        (side, fit_legs(chain, grid.nodes, grid.between, corners, extent))
         for side in order for chain in link(sides[side], entities, corners)
     ]
 
@@ -222,7 +255,7 @@ def _name_curves(
 
 
 def _make_tables(
-    path: Path, names: Sequence[tuple[str, _Side, Outline, list[int]]], regions: Mapping[str, None], options: Options
+    path: Path, names: Sequence[tuple[str, _Side, Outline, list[int]]], regions: Mapping[str, str], options: Options
 ) -> dict[str, Any]:
     material = {
         "young": YOUNG if options.young is None else options.young,
@@ -236,13 +269,13 @@ def _make_tables(
         curves[name] = {**write_shape(part), **(division if options.size is None else {"size": options.size})}
     tables: dict[str, Any] = {
         "title": f"Mesh of {path.name}",
-        "materials": {name: material for name in regions},
+        "materials": {name: material for name in regions.values()},
         "curves": curves,
         "regions": {},
     }
     cracks = [name for name, side, _, _ in names if side.use == "crack"]
-    for region in regions:
-        table: dict[str, Any] = {"material": region}
+    for region, own_material in regions.items():
+        table: dict[str, Any] = {"material": own_material}
         table["boundary"] = [name for name, side, _, _ in names if region in side.regions and side.use != "crack"]
         own = [name for name, side, _, _ in names if region in side.regions and side.use == "crack"]
         tables["regions"][region] = {**table, **({"cracks": own} if own else {})}

@@ -14,10 +14,12 @@ from typing import Any
 from pbem.errors import CaseError, Fault, PbemError
 from pbem.importing.reading import Reading, fail, read_text
 
-# Number of nodes of the kinds of elements, and of the corners, which come first.
+# Number of nodes of the kinds of elements; of the corners, which come first; and of those on each edge, which follow.
 LINES = {1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
-SURFACES = {2: (3, 3), 3: (4, 4), 9: (6, 3), 10: (9, 4), 16: (8, 4), 21: (10, 3), 23: (15, 3), 36: (16, 4), 37: (25, 4)}
+SURFACES = {2: (3, 3, 0), 3: (4, 4, 0), 9: (6, 3, 1), 10: (9, 4, 1), 16: (8, 4, 1), 21: (10, 3, 2), 23: (15, 3, 3),
+            36: (16, 4, 2), 37: (25, 4, 3)}
 POINT = 15
+SEVERAL = "For entities with several physical groups the first one is used."
 VERSIONS = ("2", "2.1", "2.2", "4.1")
 EXPECTED = "a mesh of gmsh, version 2.2 or 4.1"
 
@@ -33,7 +35,11 @@ class Cell:
 
 @dataclass
 class Grid:
-    """What a mesh holds. nodes: by tag; names: of physical groups, by dimension and number."""
+    """What a mesh holds.
+
+    nodes: by tag; names: of physical groups, by dimension and number; between: nodes of edges of higher order, by the
+    tags of both corners, from the smaller one to the other.
+    """
 
     nodes: dict[int, complex] = field(default_factory=dict)
     heights: dict[int, float] = field(default_factory=dict)
@@ -41,15 +47,28 @@ class Grid:
     surfaces: list[Cell] = field(default_factory=list)
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    between: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
+    groups: dict[frozenset[int], int] = field(default_factory=dict, repr=False)
 
     def add(self, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
         """Take in an element. Raises ValueError for one that no plane has."""
-        if kind in LINES:
-            self.lines.append(Cell(nodes[:2], group, entity))
-        elif kind in SURFACES:
-            self.surfaces.append(Cell(nodes[:SURFACES[kind][1]], group, entity))
-        elif kind != POINT:
+        if kind == POINT:
+            return
+        if kind not in LINES and kind not in SURFACES:
             raise ValueError(f"an element of type {kind}; expected points, lines, triangles and quadrangles of a plane")
+        number, inner = (2, LINES[kind] - 2) if kind in LINES else SURFACES[kind][1:]
+        corners, others = nodes[:number], nodes[number:]
+        for at, (a, b) in enumerate(zip(corners, (*corners[1:], corners[0]), strict=True) if inner else ()):
+            own = others[at * inner:(at + 1) * inner]
+            if own:
+                self.between[min(a, b), max(a, b)] = own if a < b else own[::-1]
+        # An element of several groups stands once for each of them in files of version 2.2.
+        first = self.groups.setdefault(frozenset(corners), group)
+        if first and first != group:
+            if SEVERAL not in self.notes:
+                self.notes.append(SEVERAL)
+            return
+        (self.lines if kind in LINES else self.surfaces).append(Cell(corners, group, entity))
 
 
 def read_mesh(path: Path) -> Grid:
@@ -208,19 +227,17 @@ def _read_elements_2(lines: _Lines, grid: Grid) -> None:
 
 
 def _read_elements_4(lines: _Lines, grid: Grid, physical: dict[tuple[int, int], list[int]]) -> None:
-    several = False
     for _ in range(lines.integers(4)[0]):
         dimension, entity, kind, count = lines.integers(4)[:4]
         groups = physical.get((dimension, entity), [])
-        several |= len(groups) > 1
+        if len(groups) > 1 and SEVERAL not in grid.notes:
+            grid.notes.append(SEVERAL)
         for _ in range(count):
             _add(grid, kind, tuple(lines.integers()[1:]), groups[0] if groups else 0, entity)
-    if several:
-        grid.notes.append("For entities with several physical groups the first one is used.")
 
 
 def _add(grid: Grid, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
-    wanted = LINES.get(kind) or SURFACES.get(kind, (len(nodes), 0))[0]
+    wanted = LINES.get(kind) or SURFACES.get(kind, (len(nodes), 0, 0))[0]
     if len(nodes) != wanted:
         raise ValueError(f"{len(nodes)} nodes of an element of type {kind}; expected {wanted}")
     unknown = next((node for node in nodes if node not in grid.nodes), None)
@@ -273,8 +290,8 @@ def _take(mesh: Any, path: Path) -> Grid:
     grid = Grid(names={(int(dimension), int(number)): name for name, (number, dimension) in mesh.field_data.items()})
     for tag, (x, y, z) in enumerate(mesh.points):
         _read_node(grid, tag, [repr(float(value)) for value in (x, y, z)])
-    kinds = {"line": 1, "line3": 1, "line4": 1, "triangle": 2, "triangle6": 2, "triangle10": 2, "quad": 3, "quad8": 3,
-             "quad9": 3, "quad16": 3}
+    kinds = {"line": 1, "line3": 8, "line4": 26, "line5": 27, "line6": 28, "triangle": 2, "triangle6": 9,
+             "triangle10": 21, "triangle15": 23, "quad": 3, "quad8": 16, "quad9": 10, "quad16": 36, "quad25": 37}
     for number, block in enumerate(mesh.cells):
         if block.type == "vertex":
             continue
@@ -287,7 +304,7 @@ def _take(mesh: Any, path: Path) -> Grid:
             for key in ("gmsh:physical", "gmsh:geometrical")
         )
         for nodes, group, entity in zip(block.data.tolist(), groups, entities, strict=True):
-            grid.add(kind, tuple(nodes[:{1: 2, 2: 3, 3: 4}[kind]]), abs(int(group)), int(entity))
+            grid.add(kind, tuple(nodes), abs(int(group)), int(entity))
     faults = _check(grid)
     if faults:
         raise fail(path, faults)

@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 Element = tuple[int, int, tuple[int, ...]]
 Names = Mapping[tuple[int, int], str]
 Mesh = tuple[dict[int, complex], list[Element], list[Element], Names]
-KINDS = {2: 1, 3: 2, 4: 3}
+# By dimension and number of nodes.
+KINDS = {(1, 2): 1, (1, 3): 8, (2, 3): 2, (2, 4): 3, (2, 6): 9}
 
 
 def make_ring(around: int, across: int, inner: float, outer: float) -> Mesh:
@@ -92,6 +93,33 @@ def make_block(columns: int, rows: int) -> Mesh:
     return nodes, lines, surfaces, {**names, (2, 1): "lower", (2, 2): "upper"}
 
 
+def make_polygon(corners: Sequence[complex], middles: Sequence[complex] | None, entities: Sequence[int]) -> Mesh:
+    """Triangles from the mean of the corners to the sides, which are one edge each; of second order if the places of
+    their middle nodes are given. Sides without an entity have no line."""
+    count = len(corners)
+    center = sum(corners) / count
+    nodes = {k + 1: z for k, z in enumerate([*corners, center])}
+    sides = [(k + 1, (k + 1) % count + 1) for k in range(count)]
+    lines = [(1, entity, side) for side, entity in zip(sides, entities, strict=True) if entity]
+    surfaces: list[Element] = [(1, 1, (*side, count + 1)) for side in sides]
+    if middles is not None:
+        nodes |= {count + 2 + k: z for k, z in enumerate(middles)}
+        nodes |= {2 * count + 2 + k: 0.5 * (z + center) for k, z in enumerate(corners)}
+        lines = [(1, entity, (*side, count + 1 + side[0])) for _, entity, side in lines]
+        surfaces = [
+            (1, 1, (a, b, c, count + 1 + a, 2 * count + 1 + b, 2 * count + 1 + a)) for _, _, (a, b, c) in surfaces
+        ]
+    return nodes, lines, surfaces, {(1, 1): "rim", (2, 1): "body"}
+
+
+def make_row() -> Mesh:
+    """Three unit squares in a row; those at both ends are one physical surface."""
+    nodes = {1 + i + 4 * j: complex(i, j) for j in range(2) for i in range(4)}
+    surfaces = [(1 + i % 2, 1 + i % 2, (i + 1, i + 2, i + 6, i + 5)) for i in range(3)]
+    lines = [(1, 1, (1, 5)), (2, 2, (4, 8)), *((3, 3 + i, (i + 1, i + 2)) for i in range(3))]
+    return nodes, lines, surfaces, {(1, 1): "left", (1, 2): "right", (1, 3): "bottom", (2, 1): "ends", (2, 2): "core"}
+
+
 def _begin(version: str, names: Names) -> list[str]:
     text = ["$MeshFormat", f"{version} 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
     return [*text, *(f'{dimension} {number} "{name}"' for (dimension, number), name in names.items()),
@@ -104,8 +132,9 @@ def write_2(mesh: Mesh) -> str:
     text = [*_begin("2.2", names), "$Nodes", str(len(nodes))]
     text += [f"{tag} {z.real!r} {z.imag!r} 0" for tag, z in nodes.items()]
     text += ["$EndNodes", "$Elements", str(len(lines) + len(surfaces))]
-    for number, (group, entity, own) in enumerate([*lines, *surfaces], 1):
-        text.append(" ".join(map(str, (number, KINDS[len(own)], 2, group, entity, *own))))
+    elements = [(dimension, *each) for dimension, own in ((1, lines), (2, surfaces)) for each in own]
+    for number, (dimension, group, entity, own) in enumerate(elements, 1):
+        text.append(" ".join(map(str, (number, KINDS[dimension, len(own)], 2, group, entity, *own))))
     return "\n".join([*text, "$EndElements"]) + "\n"
 
 
@@ -125,7 +154,7 @@ def write_4(mesh: Mesh) -> str:
     text += ["$EndNodes", "$Elements", f"{1 + len(blocks)} {total} 1 {total}", "0 1 15 1", "1 1"]
     number = 1
     for (dimension, entity, _), elements_of in blocks.items():
-        text.append(f"{dimension} {entity} {KINDS[len(elements_of[0])]} {len(elements_of)}")
+        text.append(f"{dimension} {entity} {KINDS[dimension, len(elements_of[0])]} {len(elements_of)}")
         for own in elements_of:
             number += 1
             text.append(" ".join(map(str, (number, *own))))

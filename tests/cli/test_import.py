@@ -17,7 +17,7 @@ import pbem
 from pbem.case import read_case
 from pbem.cli import main
 from pbem.importing.dxf_file import read_dxf
-from tests.cli.gmsh_sample import make_block, make_plate, make_ring, write_2, write_4
+from tests.cli.gmsh_sample import make_block, make_plate, make_polygon, make_ring, make_row, write_2, write_4
 
 Capture = pytest.CaptureFixture[str]
 WRITERS = {"2.2": write_2, "4.1": write_4}
@@ -242,6 +242,22 @@ def test_drawings_of_all_kinds(capsys: Capture) -> None:
     assert "CIRCLE 2: one point or none" in said and "1 TEXT: only LINE" in said
 
 
+@pytest.mark.parametrize("flag", [0, 8])
+def test_a_spline_of_a_drawing_runs_through_its_points_and_not_its_frame(flag: int) -> None:
+    """A polyline of the plane or of space (8): what the spline was drawn to is in the file with the rest."""
+    frame = [(0, 0), (1, 2), (3, 2), (4, 0)]
+    spline = [(4 * t, 6 * t * (1 - t)) for t in (0, 0.25, 0.5, 0.75, 1)]
+    space = 32 if flag else 0
+    vertices = [
+        (0, "VERTEX", 8, 0, 10, x, 20, y, 70, kind | space) for kind, own in ((16, frame), (8, spline)) for x, y in own
+    ]
+    polyline = [(0, "POLYLINE", 8, 0, 66, 1, 70, 4 | flag), *vertices, (0, "SEQEND")]
+    Path("map.dxf").write_text(write_dxf(*polyline))
+    [trace] = read_dxf(Path("map.dxf")).traces
+    [legs] = trace.parts
+    assert [legs[0].start, *(leg.end for leg in legs)] == [complex(*each) for each in spline]
+
+
 @pytest.mark.parametrize("first", [0.0, 10.1, 152.2, 154.2, 359.9])
 def test_an_arc_of_a_drawing_that_turns_by_360_degrees_is_a_circle(first: float) -> None:
     """Whatever the rounding of its angles: 512.2 - 152.2 is above 360 by a bit."""
@@ -258,6 +274,11 @@ def test_an_arc_of_a_drawing_that_turns_by_360_degrees_is_a_circle(first: float)
     ("map.geojson", "{", "line 1, column 2: found"),
     ("map.geojson", '{"type": "Topology"}', 'the file: found "Topology"'),
     ("map.geojson", '{"type": "FeatureCollection", "features": []}', "the file: found no line"),
+    ("map.csv", "x_start,x_end,y_start,y_end\n0,10,0,0\n", 'line 1: found columns "x_start", "x_end"'),
+    ("map.csv", "start x,end x,start y,end y\n0,10,0,0\n", 'line 1: found columns "start x", "end x"'),
+    ("map.csv", "x,y,trace no\n0,0,1\n10,0,1\n", 'line 1: found columns "x", "y", "trace no"'),
+    ("map.csv", "trace no,north,east\n1,0,0\n1,0,10\n", 'line 1: found columns "trace no", "north", "east"'),
+    ("map.csv", "0,0,1_0,0\n", 'line 1, x2: found "1_0"; expected a number'),
     ("map.geojson", write_map([[0, 0], [float("nan"), 1]]), "features[1].geometry.coordinates[2][1]: found nan"),
     ("map.geojson", write_map([[0, 0], [1, None]]), "features[1].geometry.coordinates[2][2]: found None"),  # type: ignore[list-item]
     ("map.geojson", write_map([[0, 0], ["1", 2]]), "features[1].geometry.coordinates[2][1]: found \"1\""),  # type: ignore[list-item]
@@ -416,6 +437,75 @@ def test_a_polygon_stays_one(capsys: Capture) -> None:
     tables = bring_in("hexagon.msh", write_2(mesh))
     assert len(tables["curves"]["surface_1_edge"]["points"]) == 7
     assert "Named here, as no physical line does: surface_1_edge" in capsys.readouterr().out
+
+
+GABLE = [0j, 3 + 0j, 3 + 1j, 2 + 1.5j, 1 + 1.5j, 1j]
+
+
+@pytest.mark.parametrize("entities", [[1, 2, 3, 4, 5, 6], [0] * 6])
+@pytest.mark.parametrize("version", WRITERS)
+def test_three_sides_of_a_gable_are_no_arc(version: str, entities: list[int]) -> None:
+    # Their four corners lie on a circle, as those of all that is the same on both sides do.
+    (curve,) = bring_in("gable.msh", WRITERS[version](make_polygon(GABLE, None, entities)))["curves"].values()
+    points = np.array(curve["points"]) @ [1, 1j]
+    assert points[0] == points[-1] and set(points.tolist()) == set(GABLE)
+
+
+@pytest.mark.parametrize("edges", [3, 4, 6])
+@pytest.mark.parametrize("version", WRITERS)
+def test_edges_of_second_order_on_a_circle_are_one(version: str, edges: int) -> None:
+    corners, middles = (np.exp(2j * np.pi * (np.arange(edges) + half) / edges).tolist() for half in (0.1, 0.6))
+    for entities in (range(1, edges + 1), [1] * edges, [0] * edges):
+        (curve,) = bring_in(
+            "disc.msh", WRITERS[version](make_polygon(corners, middles, list(entities)))
+        )["curves"].values()  # fmt: skip
+        assert curve == {"center": [0.0, 0.0], "radius": 1.0, "elements": 8}
+
+
+def test_edges_of_second_order_that_are_straight_are_a_polygon() -> None:
+    corners = np.exp(2j * np.pi * np.arange(16) / 16)
+    middles = 0.5 * (corners + np.roll(corners, -1))
+    tables = bring_in("polygon.msh", write_4(make_polygon(corners.tolist(), middles.tolist(), [1] * 16)))
+    assert len(tables["curves"]["rim"]["points"]) == 17
+
+
+def test_edges_of_second_order_are_arcs_through_their_nodes() -> None:
+    # An ellipse; sides beside it are straight.
+    ellipse = [2 * np.cos(t) + 1j * np.sin(t) for t in np.pi * np.arange(17) / 16]
+    corners = [*ellipse[::2], -2 - 1j, 2 - 1j]
+    middles = [*ellipse[1::2], -2 - 0.5j, -1j, 2 - 0.5j]
+    tables = bring_in("ellipse.msh", write_4(make_polygon(corners, middles, [*[1] * 8, 2, 3, 4])))
+    area = 0.0
+    for curve in tables["curves"].values():
+        if "points" in curve:
+            points = np.array(curve["points"]) @ [1, 1j]
+        else:
+            angles = np.radians(np.linspace(*curve["angles"], 2001))
+            points = curve["center"] @ np.array([1, 1j]) + curve["radius"] * np.exp(1j * angles)
+        area += 0.5 * (np.conj(points[:-1]) * points[1:]).imag.sum()
+    assert abs(area) == pytest.approx(np.pi + 4, rel=1e-3)
+
+
+@pytest.mark.parametrize("version", WRITERS)
+def test_a_physical_surface_of_two_parts_is_two_regions_of_one_material(version: str, capsys: Capture) -> None:
+    tables = bring_in("row.msh", WRITERS[version](make_row()), "--poisson", "0")
+    assert list(tables["regions"]) == ["ends.1", "ends.2", "core"] and list(tables["materials"]) == ["ends", "core"]
+    assert "The physical surface 'ends' has 2 parts that are not connected" in capsys.readouterr().out
+    tables["materials"]["core"]["young"] = 250.0
+    tables["boundary"] = {"left": {"ux": 0.0}, "bottom": {"uy": 0.0}, "right": {"tx": 1.0}}
+    tables["output"] = {"points": [[0.5, 0.5], [1.5, 0.5], [2.5, 0.5]]}
+    pbem.run(tables, "row.h5")
+    displacement = pbem.open_results("row.h5").interior.displacement[-1]
+    # Springs in series.
+    assert displacement[:, 0] == pytest.approx([0.5e-3, 1e-3 + 2e-3, 1e-3 + 4e-3 + 0.5e-3], rel=1e-6)
+
+
+def test_what_is_in_two_groups_is_in_the_first_of_them(capsys: Capture) -> None:
+    nodes, lines, surfaces, names = make_row()
+    again = [*surfaces, (3, surfaces[0][1], surfaces[0][2])]
+    tables = bring_in("row.msh", write_2((nodes, lines, again, names | {(2, 3): "first"})))
+    assert list(tables["regions"]) == ["ends.1", "ends.2", "core"]
+    assert "For entities with several physical groups the first one is used." in capsys.readouterr().out
 
 
 def test_a_line_inside_of_a_region_is_a_crack() -> None:

@@ -23,7 +23,7 @@ from pbem.geometry.simplification import choose_vertices
 from pbem.geometry.tolerance import ROUNDINGS, SAME_POINT
 from pbem.importing.listing import format_place, list_changes, write_case
 from pbem.importing.options import FRICTION, POISSON, YOUNG, Imported, Options
-from pbem.importing.reading import Reading, Trace, fail
+from pbem.importing.reading import Reading, Trace, fail, set_apart
 
 # Of the median length of the traces.
 SNAP, SIZE = 1e-3, 1 / 6
@@ -51,6 +51,8 @@ class _Scale:
 def make_map_case(path: Path, reading: Reading, options: Options, command: str) -> Imported:
     """The case of the traces that were read. Raises CaseError if there are none, or if their numbers make no map."""
     scale = _measure(path, reading, options)
+    renamed = set_apart([trace.name for trace in reading.traces])
+    reading.traces = [replace(trace, name=renamed.get(trace.name, trace.name)) for trace in reading.traces]
     traces: Sequence[Trace] = reading.traces
     notes: list[str] = []
     if options.simplify and not options.keep_junctions:
@@ -65,7 +67,7 @@ def make_map_case(path: Path, reading: Reading, options: Options, command: str) 
     tables = _make_tables(path, network, names, options, scale)
     summary = _summarise(reading, network, owners, names)
     notes = [*reading.notes, *notes, *_tell_defaults(options, scale)]
-    groups = [*_list_left_out(reading), *list_changes(changes)]
+    groups = [*_list_left_out(reading), *_list_renamed(renamed), *list_changes(changes)]
     text = write_case(path.name, tables, summary, notes, groups, command)
     return Imported(text, tuple(summary), tuple(notes), tuple(groups))
 
@@ -306,3 +308,10 @@ def _list_left_out(reading: Reading) -> list[tuple[str, tuple[str, ...]]]:
     if not reading.left_out:
         return []
     return [(f"{len(reading.left_out)} of the file's entries left out", tuple(reading.left_out))]
+
+
+def _list_renamed(renamed: Mapping[str, str]) -> list[tuple[str, tuple[str, ...]]]:
+    if not renamed:
+        return []
+    lines = tuple(f"{name}: {new}" for name, new in renamed.items())
+    return [(f"{len(renamed)} of the traces called otherwise, whose names would be those of pieces of others", lines)]

@@ -20,7 +20,7 @@ from pbem.importing.listing import format_place, write_case
 from pbem.importing.map_case import make_map_case, write_shape
 from pbem.importing.msh_file import Cell, Grid
 from pbem.importing.options import FRICTION, POISSON, YOUNG, Imported, Options
-from pbem.importing.reading import Reading, Trace, fail
+from pbem.importing.reading import Reading, Trace, fail, set_apart
 
 CONDITIONS = """
 # Conditions: outer curves are free of traction unless conditions are given, for example
@@ -50,6 +50,7 @@ class _Side:
 
 def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Imported:
     """The case of a mesh. Raises PbemError with what is wrong with it."""
+    _set_lines_apart(grid)
     if not grid.surfaces:
         return make_map_case(path, _read_traces(grid), options, command)
     _refuse(path, options)
@@ -74,6 +75,16 @@ def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Im
         if first is not None:
             text += comment.format(name=f'"{first}"' if "." in first or " " in first else first) + "\n"
     return Imported(text, tuple(summary), tuple(notes), tuple(groups))
+
+
+def _set_lines_apart(grid: Grid) -> None:
+    """Rename physical lines that would be taken for curves of another one."""
+    own = {key: name for key, name in grid.names.items() if key[0] == 1}
+    renamed = set_apart(list(own.values()))
+    grid.names.update({key: renamed.get(name, name) for key, name in own.items()})
+    if renamed:
+        told = ", ".join(f"'{name}' is '{new}'" for name, new in renamed.items())
+        grid.notes.append(f"Lines called otherwise, whose names would be those of parts of others: {told}.")
 
 
 def _refuse(path: Path, options: Options) -> None:

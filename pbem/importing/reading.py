@@ -94,3 +94,17 @@ def choose_names(candidates: Sequence[Sequence[str | None]], count: int) -> list
         if len(set(given)) == count:
             return given
     return [f"t{number}" for number in range(1, count + 1)]
+
+
+def set_apart(names: Sequence[str]) -> dict[str, str]:
+    """New names of those that would be taken for pieces of another one, such as fault.1 where there is a fault."""
+    known, renamed = set(names), {}
+    for name in names:
+        stem, _, number = name.rpartition(".")
+        if stem in known and number.isdecimal():
+            new = f"{stem}_{number}"
+            while new in known:
+                new += "_"
+            known.add(new)
+            renamed[name] = new
+    return renamed

@@ -15,7 +15,9 @@ import pytest
 
 import pbem
 from pbem.case import read_case
+from pbem.case.build import make_checked_model
 from pbem.cli import main
+from pbem.contact.laws import find_joint
 from pbem.importing.dxf_file import read_dxf
 from tests.cli.gmsh_sample import make_block, make_plate, make_polygon, make_ring, make_row, write_2, write_4
 
@@ -136,6 +138,19 @@ def test_names_come_from_a_unique_property(capsys: Capture) -> None:
     assert list(bring_in("map.geojson", write(7, 9.0))["curves"]) == ["7", "9"]
     for names in (("east", "east"), ("east", None), ("a\u001bb", "c")):
         assert list(bring_in("map.geojson", write(*names))["curves"]) == ["t1", "t2"]
+
+
+def test_traces_with_names_of_pieces_of_others_have_laws_of_their_own(capsys: Capture) -> None:
+    # The law of fault is that of all of its pieces, fault.1, fault.2, ..., and of no other trace.
+    rows = {"fault": (0, 0, 2, 0), "fault.1": (1, -1, 1, 1), "fault.2": (0, 3, 2, 3), "fault_1": (0, 4, 2, 4)}
+    text = "\n".join(f"{name},{','.join(map(str, row))}" for name, row in rows.items())
+    tables = bring_in("map.csv", f"id,x1,y1,x2,y2\n{text}\n")
+    assert list(tables["interfaces"]) == ["fault", "fault_1_", "fault_2", "fault_1"]
+    said = capsys.readouterr().out
+    assert "2 of the traces called otherwise" in said and "fault.1: fault_1_" in said
+    tables["interfaces"]["fault"]["cohesion"] = 5.0
+    model = make_checked_model(pbem.Case(**tables))
+    assert [find_joint(model, name).law.cohesion for name in tables["curves"]] == [5, 5, 0, 0, 0, 0]
 
 
 def test_parts_of_a_line_are_one_trace() -> None:
@@ -503,7 +518,7 @@ def test_a_physical_surface_of_two_parts_is_two_regions_of_one_material(version:
 def test_what_is_in_two_groups_is_in_the_first_of_them(capsys: Capture) -> None:
     nodes, lines, surfaces, names = make_row()
     again = [*surfaces, (3, surfaces[0][1], surfaces[0][2])]
-    tables = bring_in("row.msh", write_2((nodes, lines, again, names | {(2, 3): "first"})))
+    tables = bring_in("row.msh", write_2((nodes, lines, again, {**names, (2, 3): "first"})))
     assert list(tables["regions"]) == ["ends.1", "ends.2", "core"]
     assert "For entities with several physical groups the first one is used." in capsys.readouterr().out
 

@@ -14,8 +14,8 @@ NOTES = """\
   pbem export run.h5 -o run.csv           the contact of all interfaces
   pbem export run.h5 -o seat.csv --what contact.seat
 
-Tables: contact.NAME, contact (of all interfaces), reactions, tips, interior, steps; a row for each stored step and
-pair, curve, tip or point; numbers with all their digits, empty where they are not known."""
+Tables: contact.NAME, contact (of all interfaces), reactions, rigid, tips, interior, steps; a row for each stored step
+and pair, curve, rigid body, tip or point; numbers with all their digits, empty where they are not known."""
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +24,8 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", metavar="FILE",
                         help="a name ending with .vtkhdf (default: that of the result file) or .csv")
     parser.add_argument("--what", metavar="TABLE",
-                        help="of a .csv: contact.NAME, contact, reactions, tips, interior or steps (default: contact)")
+                        help="of a .csv: contact.NAME, contact, reactions, rigid, tips, interior or steps "
+                             "(default: contact)")
     parser.add_argument("--copy", action="store_true",
                         help="of a .vtkhdf: copy all arrays, also where it could refer to the result file")
 

@@ -151,8 +151,9 @@ def _mark_tips(
 ) -> list[Line2D]:
     """A dot at every tip, where it is now; returns its legend handle."""
     tips = find_tips(results.elements, results.nodes.curve_names, results.tips)
-    places = [face.position[end] + magnify * face.displacement[end]
-              for face in outlines if face.crack for end in (0, -1) if tuple(face.position[end]) in tips]
+    ends = [(face, end) for face in outlines if face.crack for end in (0, -1) if tuple(face.position[end]) in tips]
+    places = [face.position[end] + magnify * face.displacement[end] for face, end in ends
+              if not np.isnan(face.displacement[end]).any()]  # not there any more
     if not places or (box.asked and not box.contains(np.array(places)).any()):
         return []
     # Of many they would hide the cracks.

@@ -163,7 +163,7 @@ def find_crack_ends(results: Results, contact: Contact) -> list[tuple[bool, int,
     factors = tips[contact.name].KI if tips else np.full((1, 2), np.nan)
     ends = []
     for first, element in ((True, int(own[0])), (False, int(own[-1]))):
-        if not len(factors) or np.isnan(factors[-1, 0 if first else 1]):
+        if np.isnan(factors[:, 0 if first else 1]).all():  # at all steps: a stage may remove the crack
             continue
         arc = 0.0 if first else float(elements.geometry.select(own).lengths.sum())
         ends.append((first, element, arc, bool(elements.tip[element])))

@@ -90,7 +90,8 @@ def to_columns(points: Complex) -> Real:
 
 
 def find_tips(elements: Elements, curve_names: Sequence[str], tips: Mapping[str, Tips]) -> set[tuple[float, ...]]:
-    """The points (x, y) of all ends of cracks that are tips: those that have stress-intensity factors."""
+    """The points (x, y) of all ends of cracks that are tips: those that have stress-intensity factors at any stored
+    step. Of cracks that a stage removes with their region these are known until then."""
     count = int(elements.crack.sum()) // 2
     first = np.flatnonzero(elements.crack)[:count]
     # The elements of a crack follow each other.
@@ -100,7 +101,7 @@ def find_tips(elements: Elements, curve_names: Sequence[str], tips: Mapping[str,
     for begin, last in zip(first[begins], first[ends], strict=True) if count else ():
         factors = tips[curve_names[elements.curve[begin]]]
         for end, vertex in ((0, elements.vertices[begin, 0]), (1, elements.vertices[last, 1])):
-            if len(factors.KI) and not np.isnan(factors.KI[-1, end]):
+            if not np.isnan(factors.KI[:, end]).all():
                 points.add(tuple(vertex))
     return points
 

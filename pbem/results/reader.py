@@ -185,8 +185,8 @@ class Results:
     def to_dataframe(self, what: str) -> Any:
         """A pandas.DataFrame of an interface, crack or contact, with one row per stored step and pair.
 
-        what: its name, or "steps", "reactions", "tips", "interior", or "contact" for all interfaces together; use
-        "contact.NAME" for an interface with one of these names. Columns are named as in the file.
+        what: its name, or "steps", "reactions", "rigid", "tips", "interior", or "contact" for all interfaces together;
+        use "contact.NAME" for an interface with one of these names. Columns are named as in the file.
 
         Raises ImportError if pandas is not installed, ResultFileError if nothing in the file has this name.
         """

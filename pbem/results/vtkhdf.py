@@ -2,8 +2,8 @@
 
 The file is a collection of blocks - faces, contact, tips, interior - each an unstructured grid that does not change,
 with arrays that do: those of one step after the other, as the specification of VTKHDF 2 wants them. Where a stored
-array has this order already, a virtual dataset refers to it. What has to be rearranged is copied, and everything is
-where a run goes on writing, since it locks its file.
+array has this order already, a virtual dataset refers to it. What has to be rearranged is copied, as is what the file
+has zeros for that mean nothing; and everything is where a run goes on writing, since it locks its file.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ VERSION = (2, 2)
 # What stands where a quantity has no value: for numbers NaN.
 NO_STATUS = -1
 TIPS = ("KI", "KII", "J", "T")
+# Stored as zero, not as NaN, at the nodes of regions that a stage has removed.
+ZERO_WHERE_REMOVED = ("fields/displacement", "fields/traction")
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,8 @@ def _write_growing(
     width = 1 if each.dataset.startswith("all/tips/") else width
     shape = (k * count,) if width == 1 else (k * count, width)
     kind = np.dtype("i1") if stored.dtype.kind == "b" else stored.dtype  # VTK knows no truth values
-    if folder is not None and each.columns is None and kind == stored.dtype:
+    blanked = each.dataset in ZERO_WHERE_REMOVED and any(results.steps.removed)
+    if folder is not None and each.columns is None and kind == stored.dtype and not blanked:
         _refer(group, each.name, results.path, stored, shape, k, folder)
     else:
         whole = data.create_dataset(each.name, shape=shape, dtype=kind)
@@ -232,6 +235,8 @@ def _write_growing(
             values = stored[at]
             if each.columns is not None:
                 values = _rearrange(values, each.columns)
+            if blanked:
+                values = np.where(results.find_gone(at)[results.nodes.region, None], np.nan, values)
             whole[at * count : (at + 1) * count] = _widen(values) if vector else values.reshape(count, *shape[1:])
 
 

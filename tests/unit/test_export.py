@@ -209,6 +209,33 @@ def test_a_killed_and_resumed_run(tmp_path: Path) -> None:
     expect_arrays(tmp_path / "finished.vtkhdf", finished)
 
 
+# Rock from which a stage takes the core.
+TAKEN = """\
+materials.rock = { young = 1e3, poisson = 0.2 }
+curves.wall = { center = [0, 0], radius = 1.0, elements = 8 }
+regions.rock = { material = "rock", infinite = true, boundary = ["wall"] }
+regions.core = { material = "rock", boundary = ["wall"] }
+remote.syy = 0.0
+stages = [{ steps = 1, remote = { syy = -1.0 } }, { steps = 2, remove = ["core"] }]
+"""
+
+
+@pytest.mark.parametrize("copy", [False, True])
+def test_faces_of_what_is_removed_have_no_values(tmp_path: Path, copy: bool) -> None:
+    """They are not at rest and free of traction, as the zeros of the result file would say."""
+    (tmp_path / "taken.toml").write_text(TAKEN)
+    results = pbem.run(tmp_path / "taken.toml", tmp_path / "taken.h5")
+    export_vtkhdf(results, tmp_path / "taken.vtkhdf", copy)
+    core = np.array([results.nodes.region_names[each] == "core" for each in results.nodes.region])
+    assert 0 < core.sum() < len(core)
+    with h5py.File(tmp_path / "taken.vtkhdf", "r") as file:
+        for name, expected in (("displacement", results.displacement), ("traction", results.traction)):
+            values = file[f"VTKHDF/faces/PointData/{name}"][...].reshape(3, len(core), 3)
+            np.testing.assert_array_equal(values[..., :2], expected)
+            assert np.isnan(values[1:, core, :2]).all() and not np.isnan(values[1:, ~core]).any()
+            assert np.abs(values[0, core]).max() > 0
+
+
 def test_times_are_stages_and_fractions(blocks: Results, tmp_path: Path) -> None:
     export_vtkhdf(blocks, tmp_path / "blocks.vtkhdf")
     with h5py.File(tmp_path / "blocks.vtkhdf", "r") as file:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import pbem
 import pbem.results.evaluation
 from pbem.exact import griffith_field, kirsch_field
+from pbem.results.curve_profile import read_profile
 from pbem.results.reader import Results, open_results
 from tests.cli.cli_sample import BLOCKS
 from tests.verification.planes import ROCK
@@ -226,6 +227,26 @@ def test_stress_at_tips_of_any_direction_is_unknown(shift: complex, tmp_path: Pa
     assert np.isnan(results.interior.stress[-1]).all() and np.isfinite(results.interior.displacement[-1]).all()
     assert np.isnan(results.evaluate(points).stress[-1]).all()
     assert np.isfinite(results.evaluate(np.array(points)[::2] + 0.01).stress[-1]).all()
+
+
+def test_tips_are_known_until_a_stage_removes_them(tmp_path: Path) -> None:
+    """A crack in a core of the rock's material that is under tension, and then goes."""
+    results = run(
+        tmp_path / "taken.h5",
+        curves={"wall": {"center": [0, 0], "radius": 1.0, "elements": 8},
+                "slit": {"points": [[-0.3, -0.1], [0.3, 0.1]], "elements": 4}},
+        regions={"plane": {"material": "rock", "infinite": True, "boundary": ["wall"]},
+                 "core": {"material": "rock", "boundary": ["wall"], "cracks": ["slit"]}},
+        stages=[{"steps": 1, "remote": {"syy": 1.0}}, {"steps": 1, "remove": ["core"]}],
+    )  # fmt: skip
+    np.testing.assert_array_equal(np.isnan(results.tips["slit"].KI), [[False, False], [True, True]])
+    found = results.evaluate([[-0.3, -0.1], [0.3, 0.1], [0.0, 0.3]])
+    assert np.isnan(found.stress[:, :2]).all(), "infinite, and then not there"
+    assert np.isfinite(found.displacement[0]).all() and np.isfinite(found.stress[0, 2]).all()
+    line = read_profile(results, "slit", "opening", step=0)
+    half = np.hypot(0.3, 0.1)
+    np.testing.assert_allclose(line.line_place[[0, -1]], [0.0, 2 * half], atol=1e-12)
+    assert line.line_values[0] == line.line_values[-1] == 0.0 < line.line_values.max()
 
 
 def test_fields_beside_short_elements_on_maps(tmp_path: Path) -> None:

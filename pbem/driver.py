@@ -110,7 +110,7 @@ def run(
             target = Path(output) if output is not None else Path("case.h5" if path is None else path.stem + ".h5")
             with clock.piece("reading"):
                 model = do_on_first(comm, PbemError, lambda: impose_operator(make_checked_model(
-                    case, choose_overrides(target, set) if resume else set, label), name, operator))
+                    case, *(choose_overrides(target, set, label) if resume else (set, label))), name, operator))
                 inputs = [*([path] if path else []), *map(Path, model.law_texts)]
                 do_on_first(comm, PbemError, lambda: check_output_path(
                     target, resume=resume, force=force, source=model.source, overrides=model.overrides, inputs=inputs))

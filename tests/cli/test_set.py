@@ -96,6 +96,26 @@ def test_values_hold_when_a_run_is_gone_on_with(folder: Path, capsys: Capture) -
     assert "with no values set" in capsys.readouterr().err
 
 
+def test_values_that_another_case_does_not_take_are_told_with_their_file(folder: Path, capsys: Capture) -> None:
+    """Nobody has set them in this command; the file is of another case."""
+    text = """
+        materials.rock = { young = 1e3, poisson = 0.2 }
+        curves.one = { points = [[-1, 0], [1, 0]], elements = 2 }
+        regions.plane = { material = "rock", infinite = true, cracks = ["one"] }
+        remote.syy = 1.0
+        analysis.steps = 1
+    """
+    (folder / "one.toml").write_text(text)
+    (folder / "two.toml").write_text(text.replace("one", "two"))
+    assert main(["run", "one.toml", "--set", "curves.one.elements=3", "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["run", "two.toml", "-o", "one.h5", "--resume"]) == 2
+    assert "one.h5, of a run with --set curves.one.elements=3: found unknown name 'one'" in capsys.readouterr().err
+    assert main(["run", "two.toml", "-o", "one.h5", "--resume", "--set", "curves.one.elements=3"]) == 2
+    assert "\n  --set curves.one.elements=3: found unknown name 'one'" in capsys.readouterr().err
+    assert main(["run", "one.toml", "--resume"]) == 0
+
+
 def test_a_finished_history_is_carried_on_with_further_stages(folder: Path) -> None:
     (folder / "blocks.toml").write_text(PART)
     assert run() == 0

@@ -182,6 +182,18 @@ def test_a_search_is_stuck_where_no_fewer_pairs_change_for_long() -> None:
     assert not still.is_stuck()
 
 
+def test_a_hurried_search_that_leads_nowhere_does_not_blame_the_limit_of_iterations() -> None:
+    """The reasons as the pages have them: "iteration limit" where all that are granted were not enough, no sooner."""
+    stuck = Search(50)
+    follow(stuck, *[list(range(40))] * 20)
+    assert stuck.find_end(50, hurried=True) == "mode cycle"
+    assert stuck.find_end(50, hurried=False) is None
+    assert stuck.find_end(20, hurried=True) == stuck.find_end(20, hurried=False) == "iteration limit"
+    falling = Search(50)
+    follow(falling, *(list(range(count)) for count in range(60, 40, -1)))
+    assert falling.find_end(50, hurried=True) is None
+
+
 def test_the_full_tangent_waits_until_friction_that_changes_with_slip_is_near_its_law() -> None:
     for varying, law_error, level in ((True, 0.3, 2), (True, 0.01, 0), (False, 0.3, 0)):
         search = Search(50, varying=varying, wary=True)

@@ -299,15 +299,15 @@ class _Run:
     def _go_on_otherwise(self, found: _Iterated) -> bool:
         """Take note of an iteration; whether the next one begins from modes that were kept, or from smoothed laws.
 
-        Raises ConvergenceError ("iteration limit").
+        Raises ConvergenceError where the search is at its end (see Search.find_end).
         """
         search, outcome = self.search, found.outcome
         self.frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
         search.note(outcome.proposal, outcome.law_error)
         self.blocks.move_on(outcome.pairs, outcome.floats)
         self.running.note(search, outcome.proposal, outcome.law_error)
-        if search.taken >= self.most or (self.hurried and search.is_stuck()) or search.collapses():
-            raise end_search(self.hold, "iteration limit", self.modes, outcome.proposal, search)
+        if end := search.find_end(self.most, self.hurried):
+            raise end_search(self.hold, end, self.modes, outcome.proposal, search)
         if left:
             self.modes, self.normal_traction, self.slip, self.jump = self.kept
             return True

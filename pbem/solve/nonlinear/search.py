@@ -216,6 +216,16 @@ class Search:
         """Whether the search has found no equilibrium, and the bodies do not come to rest either."""
         return bool(self.collapse) and len(self.counts) >= LATEST
 
+    def find_end(self, most: int, hurried: bool) -> str | None:
+        """The reason for which the search ends after this iteration; None if it goes on.
+
+        most: iterations that the user grants; hurried: whether a search is given up before where it leads nowhere, by
+        pairs that go on changing each other.
+        """
+        if self.taken >= most or self.collapses():  # what moves on has a reason of its own (see end_search)
+            return "iteration limit"
+        return "mode cycle" if hurried and self.is_stuck() else None
+
     def may_sweep(self) -> bool:
         """Whether groups may settle by themselves next: as long as that lets fewer and fewer pairs change."""
         before, lately = self.counts[:-SWEPT], self.counts[-SWEPT:]

@@ -269,7 +269,7 @@ def assemble_hierarchical(
         leaves.append(strong if seen.whole else strong.place(seen.find))
         if elastic:
             far.append((int(leaf), at))
-    free = collect_free_terms(mesh, nodes, scale)
+    free = collect_free_terms(mesh, nodes, scale[nodes])
     # Expansions of the parts of a rigid motion cancel only up to their error, which would be felt where a body moves by
     # much more than it is strained: what fits best is taken off before. Small regions have no expansions.
     rigid = tuple(

@@ -121,7 +121,7 @@ def assemble_rows(
         for part, where in _list_chunks(own, mesh.traction_equation, evaluate.points):
             evaluate.put(part, bool(mesh.traction_equation[part[0]]), -scale[part], matrix, where)
         blocks.append(RegionRows(int(region), rows, columns, matrix))
-    return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale))
+    return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale[nodes]))
 
 
 def assemble_displacement_rows(
@@ -179,24 +179,27 @@ def _add_outer(matrix: Real, rows: Integer, columns: Integer, added: Real, value
         row += factor * values
 
 
-def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) -> Real:
-    """Factor (nodes,) of every node's equations: length/shear modulus for traction equations, 1 for the others.
+def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float, nodes: Integer | None = None) -> Real:
+    """Factor (k,) of the equations of nodes (k,), by themselves or all of them: length/shear modulus for traction
+    equations, 1 for the others.
 
     The length is that of the node's element, at most the given one: the hypersingular integrals over an element are its
     displacements times shear modulus over length, so that all rows have entries of the same size on graded meshes too.
     (theory, 14)
     """
-    shear_modulus = np.array([material.shear_modulus for material in materials])[mesh.node_region]
-    own = np.minimum(np.abs(mesh.end - mesh.start)[mesh.node_element], length)
-    return np.where(mesh.traction_equation, own / shear_modulus, 1.0)
+    element = mesh.node_element if nodes is None else nodes // (mesh.order + 1)
+    shear_modulus = np.array([material.shear_modulus for material in materials])[mesh.region[element]]
+    own = np.minimum(np.abs(mesh.end[element] - mesh.start[element]), length)
+    traction = mesh.traction_equation if nodes is None else mesh.traction_equation[nodes]
+    return np.where(traction, own / shear_modulus, 1.0)
 
 
 def collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_matrix:
-    """The free terms in the equations of nodes (k,): matrix (2 k, 4 nodes); scale (nodes,) as of scale_equations.
+    """The free terms in the equations of nodes (k,): matrix (2 k, 4 nodes); scale (k,) as of scale_equations.
 
     (theory, 13)
     """
-    value = np.where(mesh.node_crack[nodes], 1.0, 0.5) * scale[nodes]
+    value = np.where(mesh.crack[nodes // (mesh.order + 1)], 1.0, 0.5) * scale
     first_column = np.where(mesh.traction_equation[nodes], 2 * mesh.nodes, 0) + 2 * nodes
     columns = (first_column[:, None] + np.arange(2)).ravel()
     rows = np.arange(2 * len(nodes))

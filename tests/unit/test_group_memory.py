@@ -17,6 +17,7 @@ from pbem.mesh.numbering import list_nodes, number_components
 from pbem.solve.preconditioner.elimination import eliminate_tractions
 from pbem.solve.preconditioner.inversion import invert_rows
 from pbem.solve.preconditioner.local_operator import LocalOperator
+from pbem.solve.preconditioner.near_map import take_near
 from tests.unit.case_sample import build
 from tests.unit.test_map_memory import SCALE, draw
 from tests.unit.test_uniform import FIELD
@@ -39,14 +40,15 @@ def test_of_a_group_only_the_rows_that_are_wanted_are_held() -> None:
     load = evaluate_load(model, mesh, outer, 0, 1.0)
     matrix = build_constraints(mesh, outer, gap, draw(model, mesh, 1), load, SCALE).matrix
     local = LocalOperator(mesh, [region.material for region in model.regions], 1.0, ())
-    free = (local.free @ matrix).tocsr()
-    less = eliminate_tractions(matrix, free, mesh.node_crack)
-    elements = np.arange(mesh.elements)
-    around, by_column = number_components(list_nodes(mesh, elements)), matrix.tocsc()
+    nodes, elements = np.arange(mesh.nodes), np.arange(mesh.elements)
+    near = take_near(matrix, local.collect_free(nodes), nodes)
+    blocks = near.take_blocks()
+    less = eliminate_tractions(near, blocks, mesh.node_crack, np.abs(blocks).max())
+    around = number_components(list_nodes(mesh, elements))
     left, rows = np.flatnonzero(~less.local.ravel()), np.flatnonzero(~less.first.ravel())
-    formed, most = measure_peak(lambda: local.form(elements, around, rows, left, by_column, free, less))
+    formed, most = measure_peak(lambda: local.form(elements, around, rows, left, near, less))
     # They are those of the whole tangent operator, turned.
-    exact = local.form(elements, around, np.arange(len(around)), np.arange(len(around)), by_column, free, None)
+    exact = local.form(elements, around, np.arange(len(around)), np.arange(len(around)), near, None)
     turned = np.einsum("nij,njk->nik", less.turn, exact.reshape(mesh.nodes, 2, -1)).reshape(exact.shape)
     np.testing.assert_allclose(formed, turned[np.ix_(rows, left)], rtol=0, atol=1e-12 * np.abs(exact).max())
     assert len(rows) < 0.8 * len(around)

@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy import sparse
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
@@ -24,7 +24,7 @@ from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components
 from pbem.model.material import Material
-from pbem.parallel import gather_parts, largest_of_parts
+from pbem.parallel import add_up, gather_parts, largest_of_parts
 from pbem.solve.petsc.linear import LinearSolver
 from pbem.solve.petsc.session import PREFIX
 from pbem.solve.preconditioner.local_operator import LocalOperator, take_entries
@@ -73,7 +73,7 @@ class BodyFactors:
         the user's options put something else in their place. Too little memory to form K, which one rank can lack
         alone, is raised.
         """
-        free = (self._local.free[number_components(self._nodes)] @ constraints).tocsr()
+        free = (self._local.collect_free(self._nodes) @ constraints).tocsr()
         begin, end = self._first, self._first + 2 * len(self._nodes)
         entries = [
             (take_entries(constraints, block.columns), take_entries(free, block.rows)) for block in self._blocks
@@ -122,8 +122,7 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         self, comm: MPI.Intracomm, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
         groups: Sequence[Subdomain], nodes: Integer, rigid: Sequence[RigidMotions] = (),
     ) -> None:
-        super().__init__(mesh, materials, length, anchors, groups, nodes, rigid)
-        self._comm = comm
+        super().__init__(comm, mesh, materials, length, anchors, groups, nodes, rigid)
         self._factors: BodyFactors | None = BodyFactors(comm, mesh, self._local, nodes)
         self._drift: Real | None = None
 
@@ -138,7 +137,7 @@ class BodiesPreconditioner(SchwarzPreconditioner):
             return super().update(constraints)
         change = self._take_map(constraints)
         self._drift = change if self._drift is None else self._drift + change
-        if np.count_nonzero(self._drift > self.most_drift) <= FEW_CHANGED:
+        if self._count_own(self._drift > self.most_drift) <= FEW_CHANGED:
             return 0
         with clock.piece("preconditioner"):
             factored = self._factors.factorise(constraints.matrix)
@@ -150,15 +149,19 @@ class BodiesPreconditioner(SchwarzPreconditioner):
 
     def give_up(self) -> None:
         """See SchwarzPreconditioner; factors of another constraint map are made anew first."""
-        if self._drift is not None and self._drift.any():
+        if self._drift is not None and self._count_own(self._drift > 0):
             self._drift = np.full_like(self._drift, np.inf)
         else:
             self._drop()
 
+    def _count_own(self, columns: Bool) -> int:
+        """How many columns of the constraint map, among those of all ranks' own unknowns."""
+        return int(add_up(self._comm, np.array([float(np.count_nonzero(columns[: 2 * len(self._nodes)]))]))[0])
+
     def _drop(self) -> None:
         if self._factors is not None:
             self._factors.destroy()
-        self._factors = self._formed = None
+        self._factors, self._comparable = None, False
 
     def drop_inverses(self) -> None:
         """See SchwarzPreconditioner."""

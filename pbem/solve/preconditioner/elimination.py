@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from pbem.arrays import Bool, Real
+from pbem.solve.preconditioner.near_map import NearMap
 
 # A column or a block of a node this small, relative to the largest entry of the free terms, is none.
 NOTHING = 1e-12
@@ -36,15 +36,13 @@ class Elimination:
         return np.einsum("nij,nj->ni", self.turn, residual.reshape(-1, 2)).ravel()
 
 
-def eliminate_tractions(matrix: sparse.csr_matrix, free: sparse.csr_matrix, on_crack: Bool) -> Elimination:
-    """What can be eliminated from K = B M; matrix: M (4 n, 2 n), free (2 n, 2 n): the free terms times M.
+def eliminate_tractions(near: NearMap, blocks: Real, on_crack: Bool, largest: float) -> Elimination:
+    """What can be eliminated from K = B M of the h nodes of a map; blocks (h, 2, 2): of its `take_blocks`.
 
-    on_crack (n,): nodes whose tractions no other equation contains.
+    on_crack (h,): nodes whose tractions no other equation contains. largest: entry of the blocks of all the model.
     """
     count = len(on_crack)
-    local = _find_local(matrix, count) & on_crack[:, None]
-    blocks = take_blocks(free, count)
-    largest = float(np.abs(blocks).max(initial=0.0))
+    local = _find_local(near) & on_crack[:, None]
     length = np.linalg.norm(blocks, axis=1)
     local &= length > NOTHING * largest
     determinant = np.abs(np.linalg.det(blocks))
@@ -62,19 +60,11 @@ def eliminate_tractions(matrix: sparse.csr_matrix, free: sparse.csr_matrix, on_c
     return Elimination(turn, local, first, inverse)
 
 
-def _find_local(matrix: sparse.csr_matrix, count: int) -> Bool:
-    """Columns of M (count, 2) whose entries are tractions of their own node alone."""
-    entries = matrix.tocoo()
-    inside = (entries.row >= 2 * count) & ((entries.row - 2 * count) // 2 == entries.col // 2)
-    outside = np.bincount(entries.col[~inside & (entries.data != 0)], minlength=2 * count)
+def _find_local(near: NearMap) -> Bool:
+    """Columns of M (h, 2) whose entries are tractions of their own node alone."""
+    columns, nodes = near.columns, near.nodes
+    first_traction = columns.shape[0] // 2
+    place = np.repeat(np.arange(2 * len(nodes)), np.diff(columns.indptr))
+    inside = (columns.indices >= first_traction) & ((columns.indices - first_traction) // 2 == nodes[place // 2])
+    outside = np.bincount(place[~inside & (columns.data != 0)], minlength=2 * len(nodes))
     return np.asarray(outside.reshape(-1, 2) == 0)
-
-
-def take_blocks(free: sparse.csr_matrix, count: int) -> Real:
-    """The blocks (count, 2, 2) of every node's own unknowns in its own equations."""
-    entries = free.tocoo()
-    own = entries.row // 2 == entries.col // 2
-    blocks = np.zeros((count, 2, 2))
-    row, column = entries.row[own], entries.col[own]
-    np.add.at(blocks, (row // 2, row % 2, column % 2), entries.data[own])
-    return blocks

@@ -18,6 +18,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination
+from pbem.solve.preconditioner.near_map import NearMap
 
 # Nodes whose equations are formed at a time: of a large group all of them would take twice what is wanted of them.
 NODES_AT_ONCE = 64
@@ -26,10 +27,7 @@ NOTHING = 1e-12
 
 
 class LocalOperator:
-    """Rows of B of any nodes on any elements of their region, and of the tangent operator made of these.
-
-    free (2 n, 4 n): the free terms of all nodes.
-    """
+    """Rows of B of any nodes on any elements of their region, and of the tangent operator made of these."""
 
     def __init__(
         self, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
@@ -38,28 +36,32 @@ class LocalOperator:
         self._mesh, self._anchors, self._materials = mesh, tuple(anchors), tuple(materials)
         self._rigid = [motions for motions in rigid if motions.interpolated]
         self._sources = collect_sources(mesh, materials)
-        self._scale = scale_equations(mesh, materials, length)
+        self._length, self._per_element = length, mesh.order + 1
         self._first_element = np.searchsorted(mesh.region, np.arange(len(materials)))
-        self.free = collect_free_terms(mesh, np.arange(mesh.nodes), self._scale)
-        # The mesh makes these anew at every call, for all nodes.
-        self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
         self._anchors_of_region: dict[int, list[int]] = {}
         for number, anchor in enumerate(anchors):
             self._anchors_of_region.setdefault(anchor.region, []).append(number)
         self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
 
+    def collect_free(self, nodes: Integer) -> sparse.csr_matrix:
+        """The free terms (2 k, 4 n) in the equations of nodes (k,)."""
+        return collect_free_terms(self._mesh, nodes, self._scale(nodes))
+
+    def _scale(self, nodes: Integer) -> Real:
+        return scale_equations(self._mesh, self._materials, self._length, nodes)
+
     def form(
-        self, elements: Integer, around: Integer, rows: Integer, left: Integer, constraints: sparse.csc_matrix,
-        free: sparse.csr_matrix, less: Elimination | None,
+        self, elements: Integer, around: Integer, rows: Integer, left: Integer, near: NearMap,
+        less: Elimination | None,
     ) -> Real:
         """Turned rows of the tangent operator, and its columns that are left, of the nodes of elements, dense.
 
-        rows, left: places in around (k,), the unknowns of elements, rising.
+        rows, left: places in around (k,), the unknowns of elements, rising; near, less: of their nodes, and of others.
         """
         columns = around[left]
         if not len(columns):  # where all pairs stick nothing is left
             return np.zeros((len(rows), 0))
-        column, row, value = take_entries(constraints, columns)
+        column, row, value = take_entries(near.columns, near.find(columns))
         node = around[rows] // 2
         assert (np.diff(rows) > 0).all() and (np.diff(left) > 0).all()
         nodes, result = np.unique(node), np.empty((len(rows), len(left)))
@@ -68,16 +70,16 @@ class LocalOperator:
         step = max(1, len(nodes)) if rigid else NODES_AT_ONCE
         for begin in range(0, len(nodes), step):
             some = nodes[begin : begin + step]
-            formed = self._form_nodes(elements, some, columns, (row, column, value), free)
+            formed = self._form_nodes(elements, some, columns, (row, column, value), near)
             if less is not None:
-                formed = (less.turn[some] @ formed.reshape(len(some), 2, -1)).reshape(formed.shape)
+                formed = (less.turn[near.find_nodes(some)] @ formed.reshape(len(some), 2, -1)).reshape(formed.shape)
             own = slice(*np.searchsorted(node, [some[0], some[-1] + 1]))
             result[own] = formed[np.searchsorted(number_components(some), around[rows[own]])]
         return result
 
     def _form_nodes(
         self, elements: Integer, nodes: Integer, columns: Integer, entries: tuple[Integer, Integer, Real],
-        free: sparse.csr_matrix,
+        near: NearMap,
     ) -> Real:
         """Rows of the tangent operator of some nodes (k,), rising, on some of its columns: (2 k, columns).
 
@@ -85,13 +87,13 @@ class LocalOperator:
         """
         mesh = self._mesh
         formed = np.zeros((2 * len(nodes), len(columns)))
-        row, column, value = take_entries(free, number_components(nodes))
+        row, column, value = take_entries(near.free, near.find(number_components(nodes)))
         place, known = find_places(columns, column)
         formed[row[known], place[known]] = value[known]
         # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
-        sources = np.unique(self._node_element[entries[0] // 2 % mesh.nodes])
+        sources = np.unique(entries[0] // 2 % mesh.nodes // self._per_element)
         for region in np.unique(mesh.region[elements]):
-            own = np.flatnonzero(self._node_region[nodes] == region)
+            own = np.flatnonzero(mesh.region[nodes // self._per_element] == region)
             seen = sources[mesh.region[sources] == region]
             if len(own) and len(seen):
                 self._add_products(formed, int(region), seen, nodes, own, entries)
@@ -130,7 +132,8 @@ class LocalOperator:
         mesh = self._mesh
         sources: Sources = self._sources[region].select(elements - self._first_element[region])
         bounded = bool((sources.family == 0).any())
-        place, there = find_places(elements, self._node_element[nodes])
+        element, own_place = np.divmod(nodes, self._per_element)
+        place, there = find_places(elements, element)
         on = np.where(there, place, -1)
         seen = list_nodes(mesh, elements)
         columns = number_components(seen)
@@ -142,21 +145,22 @@ class LocalOperator:
             first, count = self._first_element[region] * (mesh.order + 1), whole.shape[1] // 2
             at = np.concatenate([number_components(seen - first), count + number_components(seen - first)])
             return whole[np.ix_(number_components(nodes - first), at)], columns
+        local = np.where(mesh.crack[element], mesh.crack_local[own_place], mesh.local[own_place])
         values = np.empty((2 * len(nodes), len(columns)))
         for traction in (False, True):
             at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
             if len(at):
                 own = nodes[at]
                 normal = mesh.normal[own] if traction else None
-                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, self._node_local[own])
+                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, local[at])
                 values[number_components(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
-        values *= -np.repeat(self._scale[nodes], 2)[:, None]
+        values *= -np.repeat(self._scale(nodes), 2)[:, None]
         for motions in self._rigid:
             place, there = find_places(columns, motions.columns)
             if motions.region == region and there.all():
                 rotation = np.zeros(4 * mesh.nodes)
                 rotation[motions.columns] = motions.basis[-1]
-                left = (self.free[number_components(nodes)] @ rotation) + values @ rotation[columns]
+                left = (self.collect_free(nodes) @ rotation) + values @ rotation[columns]
                 values[:, place] -= np.outer(left, motions.basis[-1])
         return values, columns
 
@@ -169,8 +173,8 @@ class LocalOperator:
             self._anchor(result, nodes, seen, one, other)
         return result
 
-    def find_anchored(self, constraints: ConstraintMap) -> Bool:
-        """Unknowns of the regions on which other anchors act than before."""
+    def find_anchored(self, constraints: ConstraintMap, nodes: Integer) -> Bool:
+        """Unknowns (2 k,) of nodes (k,) of the regions on which other anchors act than before."""
         released = constraints.released
         acting = np.eye(len(self._anchors))
         if released is not None:
@@ -178,7 +182,7 @@ class LocalOperator:
         moved = np.flatnonzero(np.abs(acting - self._acting).max(axis=1, initial=0.0) > 0)
         self._acting = acting
         regions = [self._anchors[number].region for number in moved]
-        return np.repeat(np.isin(self._node_region, regions), 2)
+        return np.repeat(np.isin(self._mesh.region[nodes // self._per_element], regions), 2)
 
     def _anchor(self, values: Real, nodes: Integer, seen: Integer, one: int, other: int) -> None:
         """Add the pattern of one anchor in the equations of nodes, by the functional of another of the same region."""

@@ -152,11 +152,11 @@ class HierarchicalSystem:
     def make_tangent(self, problem: Problem) -> TangentOperator:
         """GMRES, preconditioned by the groups, or by the factors of all bodies together."""
         given = (
-            problem.mesh, [region.material for region in problem.model.regions], problem.model.size, problem.anchors,
-            self.groups, self.nodes, self.operator.rigid,
+            problem.comm, problem.mesh, [region.material for region in problem.model.regions], problem.model.size,
+            problem.anchors, self.groups, self.nodes, self.operator.rigid,
         )
         preconditioner = (
-            BodiesPreconditioner(problem.comm, *given) if self.by_bodies else SchwarzPreconditioner(*given)
+            BodiesPreconditioner(*given) if self.by_bodies else SchwarzPreconditioner(*given)
         )
         return KrylovTangent(problem, self, preconditioner, self.groups, self.widen_groups)
 

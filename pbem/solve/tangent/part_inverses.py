@@ -64,7 +64,7 @@ class PartInverses:
         self._parts, self.beyond = parts, np.setdiff1d(slave[parts.pairs], nodes)
         pair_of_node = np.empty(mesh.nodes, dtype=np.int64)
         pair_of_node[slave] = np.arange(mesh.pairs.count)
-        self._softness = parts.softness[pair_of_node[np.concatenate([nodes, self.beyond])]]
+        self._softness = parts.soften(pair_of_node[np.concatenate([nodes, self.beyond])])
         self._places = [
             (place_unknowns(nodes, self.beyond, number_components(slave[near])),
              number_components(np.flatnonzero(owned)))

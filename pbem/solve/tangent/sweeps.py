@@ -28,7 +28,7 @@ from pbem.heap import give_back
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
 from pbem.parallel import add_up
-from pbem.solve.preconditioner.elimination import take_blocks
+from pbem.solve.preconditioner.near_map import NearMap
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain, find_nearest
 from pbem.solve.problem.problem import Problem
@@ -47,15 +47,20 @@ class Parts:
 
     Their pairs (k,), one part after the other, are in `pairs`, most of them in more than one part; owned (k,): those
     that belong to the part and not to what is around it. Part j has those from first[j] to first[j + 1], and their
-    stiffness[j] (see pbem.contact.local_laws). softness (m, 2, 2): from what is left of the equations of each pair's
-    node to its tractions along n and s.
+    stiffness[j] (see pbem.contact.local_laws). softness (s, 2, 2): from what is left of the equations of a pair's node
+    to its tractions along n and s, of the pairs known (s,), rising: those of all parts, and those on this rank's nodes.
     """
 
     pairs: Integer
     owned: Bool
     first: Integer
     stiffness: Sequence[Single]
+    known: Integer
     softness: Real
+
+    def soften(self, pairs: Integer) -> Real:
+        """The softness of pairs (k,) that are known."""
+        return self.softness[np.searchsorted(self.known, pairs)]
 
     def list(self) -> Iterator[tuple[Integer, Bool, Single]]:
         """Pairs, which of them are owned, and stiffness of each part."""
@@ -75,28 +80,40 @@ class Sweeps:
     ) -> None:
         self._problem, mesh = problem, problem.mesh
         self._jumps = _free(problem, ~problem.laws.follows)
-        constraints = problem.constrain(self._jumps, load)
-        closed = problem.constrain(_free(problem, np.zeros(problem.laws.count, dtype=bool)), load)
-        # The tractions of a crack's pair are in its own node's equations alone.
-        own_equations = take_blocks((preconditioner.free @ closed.matrix).tocsr(), mesh.nodes)[mesh.pairs.slave]
-        softness = np.linalg.inv(own_equations)
         self._held = np.flatnonzero(np.isin(mesh.pairs.slave, problem.system.nodes))
         pair_of_node = np.full(mesh.nodes, -1)
         pair_of_node[mesh.pairs.slave] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
-        pairs, owned = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=bool)]
-        stiffness = []
-        for own, around in _divide(mesh, groups):
-            near, inside = (_find_pairs(mesh, pair_of_node, each) for each in (around, own))
-            if not len(inside):
-                continue
-            formed = preconditioner.form_block(constraints.matrix, around, mesh.pairs.slave[near])
-            formed = softness[near] @ formed.reshape(len(near), 2, -1)
-            stiffness.append(-formed.reshape(2 * len(near), -1).astype(np.float32))
-            pairs.append(near)
-            owned.append(np.isin(near, inside))
-        first = np.cumsum([len(each) for each in pairs])
-        self.parts = Parts(np.concatenate(pairs), np.concatenate(owned), first, stiffness, softness)
+        divided = [
+            (around, *(_find_pairs(mesh, pair_of_node, each) for each in (around, own)))
+            for own, around in _divide(mesh, groups)
+        ]
+        divided = [each for each in divided if len(each[2])]
+        near = _take_near(problem, preconditioner, self._jumps, load, [each for each, _, _ in divided])
+        known, softness = self._soften(preconditioner, load, [each for _, each, _ in divided])
+        stiffness: list[Single] = []
+        none, first = np.zeros(0, dtype=np.int64), np.cumsum([0, *(len(each) for _, each, _ in divided)])
+        self.parts = Parts(
+            np.concatenate([none, *(each for _, each, _ in divided)]),
+            np.concatenate([none.astype(bool), *(np.isin(each, inside) for _, each, inside in divided)]),
+            first, stiffness, known, softness,
+        )  # fmt: skip
+        for around, each, _ in divided:
+            formed = preconditioner.form_block(near, around, mesh.pairs.slave[each])
+            formed = self.parts.soften(each) @ formed.reshape(len(each), 2, -1)
+            stiffness.append(-formed.reshape(2 * len(each), -1).astype(np.float32))
         give_back()
+
+    def _soften(
+        self, preconditioner: SchwarzPreconditioner, load: Load, parts: Sequence[Integer]
+    ) -> tuple[Integer, Real]:
+        """See `Parts`: known pairs, those of parts among them, and their softness."""
+        problem, slave = self._problem, self._problem.mesh.pairs.slave
+        known = np.unique(np.concatenate([self._held, *parts]))
+        nodes = np.sort(slave[known])
+        closed = problem.constrain(_free(problem, np.zeros(problem.laws.count, dtype=bool)), load)
+        # The tractions of a crack's pair are in its own node's equations alone.
+        own_equations = preconditioner.take_near(closed.matrix, nodes).take_blocks()
+        return known, np.linalg.inv(own_equations[np.searchsorted(nodes, slave[known])])
 
     def settle(
         self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
@@ -174,7 +191,7 @@ class Sweeps:
         equations = problem.apply(v, load, constraints.released).reshape(-1, 2)
         place = np.searchsorted(problem.system.nodes, mesh.pairs.slave[self._held])
         result = np.zeros((mesh.pairs.count, 2))
-        result[self._held] = -(self.parts.softness[self._held] @ equations[place][..., None])[..., 0]
+        result[self._held] = -(self.parts.soften(self._held) @ equations[place][..., None])[..., 0]
         return add_up(problem.comm, result)
 
 
@@ -200,6 +217,14 @@ def _halve(middle: Complex, elements: Integer) -> Iterator[Integer]:
     order = np.argsort(along, kind="stable")
     for half in (order[: len(order) // 2], order[len(order) // 2 :]):
         yield from _halve(middle, np.sort(elements[half]))
+
+
+def _take_near(
+    problem: Problem, preconditioner: SchwarzPreconditioner, law: Linearisation, load: Load, parts: Sequence[Integer]
+) -> NearMap:
+    """The constraint map of a law, of the nodes of parts' elements."""
+    elements = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *parts]))
+    return preconditioner.take_near(problem.constrain(law, load).matrix, list_nodes(problem.mesh, elements))
 
 
 def _find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer:

@@ -22,6 +22,7 @@ from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import Cascade, run_cascade
 from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain, begin_course
+from pbem.solve.nonlinear.cluster_search import ClusterSearch
 from pbem.solve.nonlinear.damped import can_be_damped, rest_late
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
@@ -125,6 +126,7 @@ def _search_modes(
         "hold": Hold(problem, memory, load), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
         "smoothing": smoothing, "running": RunningGroup(problem, tangent),
         "blocks": OpenBlocks(problem, smoothing.smooth),
+        "clusters": smoothing.make_cluster_search(),
     }
     checkpoint = Checkpoint(tangent, load, iterations, parts)
     course = checkpoint.resume(resumed) if resumed else None
@@ -154,12 +156,13 @@ class _Run:
         refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
         checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
         fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup, blocks: OpenBlocks,
+        clusters: ClusterSearch,
     ) -> None:
         """See _search_modes; course: with which it begins, None at its first iteration."""
         self.problem, self.laws, self.tangent, self.load, self.reporter = problem, problem.laws, tangent, load, reporter
         self.refuse, self.hurried, self.iterations, self.checkpoint = refuse, hurried, iterations, checkpoint
         self.hold, self.search, self.forcing, self.fixed_point = hold, search, forcing, fixed_point
-        self.smoothing, self.running, self.blocks = smoothing, running, blocks
+        self.smoothing, self.running, self.blocks, self.clusters = smoothing, running, blocks, clusters
         course = course or begin_course(hold, len(iterations) // PATIENCE)
         self.modes, self.normal_traction, self.slip, self.jump = (
             course.modes, course.normal_traction, course.slip, course.jump)
@@ -335,8 +338,10 @@ class _Run:
         chosen = cascade.modes if cascade else rest.modes if rest else None
         # The first rank alone knows which pairs hold a body.
         share = broadcast(self.problem.comm, max(search.globalisation.share, self.hold.share))
+        if chosen is None:
+            chosen = self._settle_clusters(found)
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
-        if not cascade and not rest and not (share > search.globalisation.share):
+        if chosen is None and not (share > search.globalisation.share):
             chosen = pivot_group(self.hold, self.tangent, found.constraints, self.modes, self.memory, self.load,
                                  found.law, found.solved, search)
         back = chosen is not None and not rest and search.returns(chosen.fingerprint())
@@ -346,6 +351,17 @@ class _Run:
         if back and not go_on_warily(self.forcing, search):
             raise end_search(self.hold, "mode cycle", self.modes, proposal, search)
         return chosen
+
+    def _settle_clusters(self, found: _Iterated) -> ModeState | None:
+        """The modes that clusters around the pairs that change settle on by themselves; None where none do."""
+        if not self.clusters.suits(self.search):
+            return None
+        settled = self.clusters.settle(
+            self.tangent, self.search, self.modes, found.law, found.solved, found.outcome.pairs)
+        if settled is None:
+            return None
+        self.blocks.move_on(settled[1], None)
+        return settled[0]
 
     def _move_on(self, found: _Iterated, cascade: Cascade | None) -> None:
         """Choose the modes of the next iteration, and where its laws are taken. Raises ConvergenceError ("mode cycle").

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pbem.arrays import Real
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
@@ -34,11 +34,12 @@ from pbem.contact.smoothed import (
     take_off_proximal,
 )
 from pbem.errors import ConvergenceError
+from pbem.solve.nonlinear.cluster_search import ClusterSearch, put_states, stack_states, take_cluster, take_pairs
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.recorded import Record
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.tangent import TangentOperator
+from pbem.solve.problem.tangent import PairClusters, TangentOperator
 
 # The laws are smoothed where after so many iterations, or where groups do not settle by themselves after so many, ...
 FIRST, FIRST_ALONE = 3, 12
@@ -49,17 +50,22 @@ MANY, LEAST = 0.03, 60
 # or, after any number of iterations where groups settle by themselves, as many times as many as at best before.
 SOARED = 2
 # The first width is this part of the mean violation of the true laws; the last one this part of the largest traction:
-# with less, blocks that touch nothing would be held by nothing but rounding.
-WIDTH, NARROWEST = 0.1, 1e-6
+# with less, blocks that touch nothing would be held by nothing but rounding. Where no clusters settle by themselves the
+# true laws, by which few pairs are pivoted, do better from a larger one.
+WIDTH, NARROWEST, NARROWEST_ALONE = 0.1, 1e-8, 1e-6
 # The square of the width falls to AIM of itself where pairs are off their smoothed laws by no more than CENTRED of it,
 # in the mean along all pairs, in which none counts for more than FARTHEST widths; to AIM_AGAIN after such a fall that
-# leaves them there. Else an iteration with the same width brings them nearer.
-AIM, AIM_AGAIN = 0.1, 0.01
-CENTRED, FARTHEST = 0.15, 10.0
+# leaves them there, or to AIM_FAR where clusters settle by themselves, if pairs were off by no more than CALM before
+# that. Else an iteration with the same width brings them nearer.
+AIM, AIM_AGAIN, AIM_FAR = 0.1, 0.01, 1e-3
+CENTRED, CALM, FARTHEST = 0.15, 0.1, 10.0
 # Of the way to a solution the largest of these parts is gone that leaves pairs off by no more than NEAR; with the same
 # width, the whole if it leaves BETTER of what they were off, else the part that leaves least.
 PARTS = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05)
 NEAR, BETTER = 0.3, 0.9
+# Between iterations pairs that are off by more than so many widths settle in clusters by themselves, unless they are
+# more than this part of all.
+OFF, MOST_OFF = 1.0, 0.3
 # Pairs that are shorter than the mean have larger widths, by the root of how much shorter they are, up to so much.
 MOST_WIDENED = 1e3
 # The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
@@ -68,11 +74,13 @@ PROXIMAL = 1e-5
 # It ends after so many iterations, or one with the last width in which no more than this part of all pairs, or so many,
 # change: with the true laws the few blocks that are left settle sooner.
 LONGEST, FEW, FEWEST = 40, 1e-2, 10
+# Or one with the last width after which pairs are off by no more than this once clusters have settled.
+SETTLED = 0.01
 # The part of the residual that is left, as blocks that are nearly free move by far more than it tells: for the first
 # width, for narrower ones less, by the root of how much narrower they are, ...
 CLOSELY = 1e-3
 # ... and in the iterations with the true laws that follow.
-CLOSELIEST = 1e-5
+CLOSELIEST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -88,20 +96,24 @@ class Width:
         """The width after a part of the way to what is aimed at. (theory, 132)"""
         return max(self.value * float(np.sqrt(1 - part * (1 - self.aim))), self.last)
 
-    def go_on(self, part: float, off: float) -> Width:
-        """The width of the next iteration, after one that went a part of its way and leaves pairs so much off."""
+    def go_on(self, part: float, off: float, calm: bool = False) -> Width:
+        """The width of the next iteration, after one that went a part of its way and leaves pairs so much off.
+
+        calm: whether they were no further off than CALM before clusters settled by themselves.
+        """
         value = self.fall(part)
-        aim = 1.0 if off > CENTRED else AIM if self.aim == 1 or part < 1 else AIM_AGAIN
+        aim = 1.0 if off > CENTRED else AIM if self.aim == 1 or part < 1 else AIM_FAR if calm else AIM_AGAIN
         return replace(self, value=value, aim=max(aim, (self.last / value) ** 2))
 
 
 @dataclass(frozen=True)
 class SmoothCourse:
-    """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, the
-    modes that hold all bodies, and the width."""
+    """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, one
+    that the equations hold of, the modes that hold all bodies, and the width."""
 
     modes: ModeState
     state: PairState
+    exact: PairState
     holding: ModeState
     width: Width
 
@@ -137,6 +149,10 @@ class SmoothSearch:
         mean = float(weight[self.smooth].mean())
         return np.asarray(np.sqrt(mean / np.clip(weight, mean / MOST_WIDENED**2, mean)))
 
+    def make_cluster_search(self) -> ClusterSearch:
+        """The search by clusters of the same pairs."""
+        return ClusterSearch(self._problem, self._memory, self._load, self.smooth & self._allowed, self._shape)
+
     def begins(self, counts: Sequence[int], state: PairState) -> bool:
         """Whether laws are to be smoothed after an iteration, by the numbers of pairs that changed in those so far.
 
@@ -163,13 +179,15 @@ class SmoothSearch:
         solved it comes back with what was before.
         """
         problem, memory, load = self._problem, self._memory, self._load
+        clusters = tangent.find_clusters(load)
         if self._course is None:
-            self._course = self._start(modes)
-        modes, state, holding = self._course.modes, self._course.state, self._course.holding
+            self._course = self._start(modes, clusters is None)
+        modes, state, exact = self._course.modes, self._course.state, self._course.exact
+        holding = self._course.holding
         width = self._course.width
         proximal = PROXIMAL * problem.laws.own_stiffness
         for taken in range(self.taken, min(LONGEST, most)):
-            self._course = SmoothCourse(modes, state, holding, width)
+            self._course = SmoothCourse(modes, state, exact, holding, width)
             pause()
             if not 0 < width.value < np.inf:
                 break
@@ -187,29 +205,55 @@ class SmoothSearch:
                     raise
                 return modes, state
             forcing.used |= solved.loosely
-            found = evaluate_pairs(problem.mesh, law, solved.unknowns)
-            found = take_off_proximal(problem.laws, self.smooth, found, state, proximal)
+            whole = evaluate_pairs(problem.mesh, law, solved.unknowns)
+            found = take_off_proximal(problem.laws, self.smooth, whole, state, proximal)
             part, off = problem.decide(lambda now=state, new=found, at=width: self._choose_part(now, new, at))  # type: ignore[misc]
-            before, state = modes, state.approach(found, part)
+            before, state, exact = modes, state.approach(found, part), exact.approach(whole, part)
+            calm = clusters is not None and off <= CALM
+            if clusters is not None:
+                state, off = self._settle_clusters(clusters, state, exact, width.fall(part), off)
             modes = problem.decide(lambda at=state: (  # type: ignore[misc]
                 read_modes(problem.laws, self.smooth, at, memory, load.pressure)))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
             self.taken += 1
-            few = np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST)
-            if part == 1 and width.fall(part) <= width.last and few:
+            few = part == 1 and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST)
+            if width.fall(part) <= width.last and (few or (clusters is not None and off <= SETTLED)):
                 break
-            width = width.go_on(part, off)
+            width = width.go_on(part, off, calm)
         return modes, state
 
-    def _start(self, modes: ModeState) -> SmoothCourse:
+    def _settle_clusters(
+        self, clusters: PairClusters, state: PairState, exact: PairState, width: float, off: float
+    ) -> tuple[PairState, float]:
+        """The state, with pairs that are off their smoothed laws settled in clusters; and how much pairs are off then.
+
+        exact: a state that the equations hold of. off: how much pairs were off.
+        """
+        problem, widths = self._problem, width * self._shape
+        far = problem.decide(lambda: self._find_violation(state, width) > OFF * widths)
+        if not 0 < np.count_nonzero(far) <= MOST_OFF * len(far):
+            return state, off
+
+        def settle(pairs: Integer, stiffness: Real) -> Real | None:
+            contact = take_cluster(problem, self._memory, self._load, self.smooth, exact, pairs, stiffness)
+            own = PROXIMAL * problem.laws.own_stiffness[pairs]
+            found = contact.settle_smoothed(take_pairs(state, pairs), widths[pairs], own)
+            return None if found is None else stack_states(found)
+
+        values, settled = clusters.solve(far, 4, settle)
+        state = put_states(state, values, settled)
+        return state, problem.decide(lambda: self._measure_off(state, width))
+
+    def _start(self, modes: ModeState, alone: bool) -> SmoothCourse:
         problem, load, first = self._problem, self._load, self._first
         assert first is not None
         largest, violation = problem.decide(lambda: (
             float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
-        last = NARROWEST * largest
+        last = (NARROWEST_ALONE if alone else NARROWEST) * largest
         begin = max(WIDTH * violation, last)
-        return SmoothCourse(modes, first, close_smoothed(problem.laws, modes), Width(begin, begin, last))
+        width = Width(begin, begin, last)
+        return SmoothCourse(modes, first, first, close_smoothed(problem.laws, modes), width)
 
     def _choose_part(self, state: PairState, found: PairState, width: Width) -> tuple[float, float]:
         """The part of the way from a state to a solution that is gone, and by how much pairs are off then."""

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState, PairLaws, PairState
 from pbem.contact.loads import Load
@@ -17,6 +17,10 @@ from pbem.errors import ConvergenceError
 
 # The modes that states of some pairs ask for: of their laws, modes, states, memory and pressure.
 Judge = Callable[[PairLaws, ModeState, PairState, Memory, Real], Proposal]
+
+# What pairs (k,), rising, and their stiffness lead to: values (k, c), or None. The stiffness (2 k, 2 k) gives
+# tractions, in units of the traction scale, from jumps, n and s of pair after pair, with all others' as they are.
+SolveCluster = Callable[[Integer, Real], Real | None]
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,16 @@ class Settling:
     most_pairs: int
     with_neighbours: bool
     nearby: bool
+
+
+class PairClusters(Protocol):
+    """Clusters of neighbouring pairs that are solved for by themselves; all ranks call them together."""
+
+    def solve(self, chosen: Bool, columns: int, solve: SolveCluster) -> tuple[Real, Bool]:
+        """What clusters around the chosen pairs (m,) lead to: values (m, columns), and which pairs (m,) have some.
+
+        Pairs that follow others have their leaders'.
+        """
 
 
 class TangentOperator(Protocol):
@@ -98,6 +112,10 @@ class TangentOperator(Protocol):
     ) -> ModeState:
         """Modes (m,) on which groups of elements settle by themselves; those that there are where none do."""
         return modes
+
+    def find_clusters(self, load: Load) -> PairClusters | None:
+        """Clusters of pairs that can be solved for by themselves; None where solutions of the whole cost less."""
+        return None
 
     def listen(self, must_stop: Callable[[], bool], stop: Callable[[], None]) -> None:
         """Ask now and then, all ranks together, whether to stop, and then do so; where one solution may take long."""

@@ -23,6 +23,7 @@ from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
+from pbem.solve.tangent.clusters import Clusters
 from pbem.solve.tangent.krylov_calls import (
     Preconditioning,
     Product,
@@ -34,10 +35,10 @@ from pbem.solve.tangent.krylov_calls import (
     refuse_unsolved,
     take_options,
 )
+from pbem.solve.tangent.local_contact import LocalContact
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.tangent.part_inverses import PartInverses
 from pbem.solve.tangent.shared_product import SharedProduct, SharedRows
-from pbem.solve.tangent.sweeps import Sweeps
 
 # Most iterations of GMRES for one linear system, without restart.
 MOST_ITERATIONS = 300
@@ -100,7 +101,7 @@ class KrylovTangent(TangentOperator):
         self.widening = 1
         rows = 2 * len(problem.system.nodes)
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
-        self._sweeps: Sweeps | None = None
+        self._local = LocalContact(problem, preconditioner, groups)
         self._parts, self._by_parts = PartInverses(problem), False
         self._order = find_order(problem)
         self._matrix = PETSc.Mat().createPython(sizes, Product(self), comm=problem.comm)
@@ -154,14 +155,9 @@ class KrylovTangent(TangentOperator):
         self._product.take_map(constraints)
         if self._by_parts and law is not None:
             self.preconditioner.pass_over(constraints)
-            self._parts.form(law, self._divide(load).parts)
+            self._parts.form(law, self._local.divide(load).parts)
         else:
             self.preconditioner.update(constraints)
-
-    def _divide(self, load: Load) -> Sweeps:
-        if self._sweeps is None:
-            self._sweeps = Sweeps(self.problem, self.preconditioner, self._groups, load)
-        return self._sweeps
 
     def _forget(self) -> None:
         self._known = None
@@ -320,8 +316,12 @@ class KrylovTangent(TangentOperator):
         solved: Solved, judge: Judge,
     ) -> ModeState:
         """See TangentOperator; the next solution begins from the states that go with the modes."""
-        settled, self.expected = self._divide(load).settle(constraints, modes, memory, load, law, solved, judge)
+        settled, self.expected = self._local.divide(load).settle(constraints, modes, memory, load, law, solved, judge)
         return settled
+
+    def find_clusters(self, load: Load) -> Clusters | None:
+        """See TangentOperator."""
+        return self._local.find_clusters(load) if self.settling.nearby else None
 
     def gather(self, part: Real) -> Real:
         """A vector (unknowns,) on every rank, in the order of the nodes, from the ranks' parts."""
@@ -384,14 +384,15 @@ class KrylovTangent(TangentOperator):
 
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
-        self.problem, self.expected, self._sweeps, self._parts = problem, None, None, PartInverses(problem)
+        self.problem, self.expected, self._parts = problem, None, PartInverses(problem)
+        self._local = LocalContact(problem, self.preconditioner, self._groups)
         self._product.take_over(problem)
         self.preconditioner.most_drift = MOST_DRIFT
         self._forget()
 
     def destroy(self) -> None:
         """See TangentOperator."""
-        self._sweeps = None
+        self._local.forget()
         self._parts.forget()
         self._space.forget()
         self.preconditioner.drop_inverses()

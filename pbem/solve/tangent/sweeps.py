@@ -79,12 +79,12 @@ class Sweeps:
         self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Iterable[Subdomain], load: Load
     ) -> None:
         self._problem, mesh = problem, problem.mesh
-        self._jumps = _free(problem, ~problem.laws.follows)
+        self._jumps = free_jumps(problem, ~problem.laws.follows)
         self._held = np.flatnonzero(np.isin(mesh.pairs.slave, problem.system.nodes))
         pair_of_node = np.full(mesh.nodes, -1)
         pair_of_node[mesh.pairs.slave] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
         divided = [
-            (around, *(_find_pairs(mesh, pair_of_node, each) for each in (around, own)))
+            (around, *(find_pairs(mesh, pair_of_node, each) for each in (around, own)))
             for own, around in _divide(mesh, groups)
         ]
         divided = [each for each in divided if len(each[2])]
@@ -110,7 +110,7 @@ class Sweeps:
         problem, slave = self._problem, self._problem.mesh.pairs.slave
         known = np.unique(np.concatenate([self._held, *parts]))
         nodes = np.sort(slave[known])
-        closed = problem.constrain(_free(problem, np.zeros(problem.laws.count, dtype=bool)), load)
+        closed = problem.constrain(free_jumps(problem, np.zeros(problem.laws.count, dtype=bool)), load)
         # The tractions of a crack's pair are in its own node's equations alone.
         own_equations = preconditioner.take_near(closed.matrix, nodes).take_blocks()
         return known, np.linalg.inv(own_equations[np.searchsorted(nodes, slave[known])])
@@ -203,20 +203,20 @@ def _divide(mesh: Mesh, groups: Iterable[Subdomain]) -> Iterator[tuple[Integer, 
         if not len(group.nearest):
             yield group.elements, group.around
             continue
-        for part in _halve(middle, group.elements):
+        for part in halve_elements(middle, group.elements, PART_ELEMENTS):
             yield part, np.union1d(part, find_nearest(mesh, part, tree, int(PART_SHARE * len(part))))
 
 
-def _halve(middle: Complex, elements: Integer) -> Iterator[Integer]:
-    """Elements by place in parts of at most PART_ELEMENTS, each rising."""
-    if len(elements) <= PART_ELEMENTS:
+def halve_elements(middle: Complex, elements: Integer, most: int) -> Iterator[Integer]:
+    """Elements by place in parts of so many at most, each rising."""
+    if len(elements) <= most:
         yield elements
         return
     at = middle[elements]
     along = at.real if np.ptp(at.real) >= np.ptp(at.imag) else at.imag
     order = np.argsort(along, kind="stable")
     for half in (order[: len(order) // 2], order[len(order) // 2 :]):
-        yield from _halve(middle, np.sort(elements[half]))
+        yield from halve_elements(middle, np.sort(elements[half]), most)
 
 
 def _take_near(
@@ -227,13 +227,13 @@ def _take_near(
     return preconditioner.take_near(problem.constrain(law, load).matrix, list_nodes(problem.mesh, elements))
 
 
-def _find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer:
+def find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer:
     """The pairs on elements that have a mode of their own, rising."""
     pairs = pair_of_node[list_nodes(mesh, elements)]
     return np.sort(pairs[pairs >= 0])
 
 
-def _free(problem: Problem, jumps: Bool) -> Linearisation:
+def free_jumps(problem: Problem, jumps: Bool) -> Linearisation:
     """The law of pairs that are free to have any jumps, without tractions, where jumps (m,); else any tractions."""
     tangent = np.zeros((problem.laws.count, 4, 2))
     tangent[jumps, G_N, 0] = tangent[jumps, G_S, 1] = 1.0

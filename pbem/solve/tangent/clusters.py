@@ -1,0 +1,147 @@
+"""Clusters of neighbouring pairs of crack networks, which settle their contact with the jumps beyond as they are.
+
+Where all but a few pairs of a network are near to their laws, those few, around thin blocks or where contact ends,
+keep all others waiting: each solution of the whole moves them a little, or too far. Solved for by themselves they are
+as near as the others at the next one (non-linear elimination: P. J. Lanzkron, D. J. Rose, J. T. Wilkes, SIAM J. Sci.
+Comput. 17, 1996; X.-C. Cai, X. Li, SIAM J. Sci. Comput. 33, 2011). Unlike the groups that settle before every solution
+(pbem.solve.tangent.sweeps), clusters form where such pairs are, with all of a small block and some of the surroundings.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from pbem.arrays import Bool, Integer, Real
+from pbem.clock import clock
+from pbem.contact.loads import Load
+from pbem.mesh.numbering import list_nodes, number_components
+from pbem.parallel import add_up
+from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.preconditioner.subdomains import find_nearest
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import SolveCluster
+from pbem.solve.tangent.sweeps import find_pairs, free_jumps, halve_elements
+
+# Elements belong to one cluster if they have one of the so many nearest elements in common.
+NEIGHBOURS = 16
+# Elements of a cluster at most, and of a block that is taken whole; what a cluster takes grows with the third power.
+MOST_ELEMENTS = 80
+# Elements around a cluster, as a multiple of its own, and at least.
+AROUND, LEAST_AROUND = 1.0, 32
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """The elements of a cluster and the ones around it, rising; pairs (k,), rising: those on them that have a mode of
+    their own; kept (k,): those whose values are taken from this cluster."""
+
+    elements: Integer
+    pairs: Integer
+    kept: Bool
+
+
+class Clusters:
+    """Forms clusters around pairs, and lets them be solved for; alike on all ranks."""
+
+    def __init__(self, problem: Problem, preconditioner: SchwarzPreconditioner, softness: Real, load: Load) -> None:
+        """softness (m, 2, 2): from what is left of the equations of each pair's node to its tractions along n and s."""
+        self._problem, self._softness, self._preconditioner = problem, softness, preconditioner
+        mesh, follows = problem.mesh, problem.laws.follows
+        matrix = problem.constrain(free_jumps(problem, ~follows), load).matrix
+        self._columns, self._free = matrix.tocsc(), (preconditioner.free @ matrix).tocsr()
+        self._pair_of_node = np.full(mesh.nodes, -1)
+        self._pair_of_node[mesh.pairs.slave] = np.where(follows, -1, np.arange(mesh.pairs.count))
+        self._element = mesh.node_element[mesh.pairs.slave]
+        middle = 0.5 * (mesh.start + mesh.end)
+        self._middle, self._tree = middle, cKDTree(np.column_stack([middle.real, middle.imag]))
+        around = (np.unique(self._element[problem.cut.find_around(body)[0]])
+                  for body in np.flatnonzero(problem.parts.block))
+        self._blocks = [each for each in around if len(each) <= MOST_ELEMENTS]
+
+    def solve(self, chosen: Bool, columns: int, solve: SolveCluster) -> tuple[Real, Bool]:
+        """See PairClusters; each rank for some of the clusters."""
+        problem, comm = self._problem, self._problem.comm
+        clusters = self.form(chosen)
+        found = np.zeros((len(chosen), columns + 1))
+        with clock.piece("clusters"):
+            for number, each in enumerate(clusters):
+                if number % comm.size != comm.rank:
+                    continue
+                values = solve(each.pairs, self._find_stiffness(each))
+                if values is not None:
+                    found[each.pairs[each.kept]] = np.column_stack([values, np.ones(len(values))])[each.kept]
+        found = add_up(comm, found)[problem.laws.leader]
+        return found[:, :-1], found[:, -1] > 0
+
+    def form(self, chosen: Bool) -> list[Cluster]:
+        """Clusters around the chosen pairs (m,), the largest ones first."""
+        mesh, laws = self._problem.mesh, self._problem.laws
+        elements = np.unique(self._element[laws.leader[chosen]])
+        sets = [part for own in self._join(self._link(elements))
+                for part in halve_elements(self._middle, own, MOST_ELEMENTS)]
+        whole = [np.union1d(own, find_nearest(mesh, own, self._tree, max(LEAST_AROUND, int(AROUND * len(own)))))
+                 for own in sets]
+        order = np.argsort([-len(each) for each in whole], kind="stable")
+        # A pair around several clusters takes its values from the first of them, but from its own if it is in one.
+        owner = np.full(mesh.pairs.count, -1)
+        pairs = [find_pairs(mesh, self._pair_of_node, each) for each in whole]
+        for number in order[::-1]:
+            owner[pairs[number]] = number
+        for number in order[::-1]:
+            owner[find_pairs(mesh, self._pair_of_node, sets[number])] = number
+        return [Cluster(whole[number], pairs[number], owner[pairs[number]] == number) for number in order]
+
+    def _link(self, elements: Integer) -> list[Integer]:
+        """Sets of elements that are near to each other."""
+        if not len(elements):
+            return []
+        count = self._problem.mesh.elements
+        at = self._middle[elements]
+        _, near = self._tree.query(np.column_stack([at.real, at.imag]), k=min(NEIGHBOURS, count))
+        return _connect([np.append(each, own) for each, own in zip(near.reshape(len(at), -1), elements, strict=True)],
+                        [elements[k : k + 1] for k in range(len(elements))], count)
+
+    def _join(self, sets: list[Integer]) -> list[Integer]:
+        """The sets with all of the blocks that they touch, where that is not too much."""
+        count = self._problem.mesh.elements
+        inside = np.zeros(count, dtype=bool)
+        for each in sets:
+            inside[each] = True
+        touched = [block for block in self._blocks if inside[block].any()]
+        joined = _connect(sets + touched, sets + touched, count)
+        result = []
+        for each in joined:
+            within = np.zeros(count, dtype=bool)
+            within[each] = True
+            result += [each] if len(each) <= MOST_ELEMENTS else [own for own in sets if within[own].any()]
+        return result
+
+    def _find_stiffness(self, cluster: Cluster) -> Real:
+        """Tractions (2 k,), in units of the traction scale, of the cluster's pairs from their jumps (2 k,), n and s of
+        pair after pair, with all others as they are."""
+        mesh, pairs = self._problem.mesh, cluster.pairs
+        around = list_nodes(mesh, cluster.elements)
+        asked = number_components(np.searchsorted(around, mesh.pairs.slave[pairs]))
+        at = np.sort(asked)  # pairs need not be in the order of their nodes
+        formed = self._preconditioner.form_rows(cluster.elements, at, self._columns, self._free)
+        place = np.searchsorted(at, asked)
+        rows = formed[np.ix_(place, place)].reshape(len(pairs), 2, -1)
+        return np.asarray(-(self._softness[pairs] @ rows).reshape(2 * len(pairs), -1))
+
+
+def _connect(links: list[Integer], sets: list[Integer], count: int) -> list[Integer]:
+    """The unions of sets of numbers below `count` whose links have a number in common, each rising."""
+    if not sets:
+        return []
+    row = np.repeat(np.arange(len(links)), [len(each) for each in links])
+    ends = (row, len(links) + np.concatenate(links))
+    size = len(links) + count
+    graph = sparse.coo_matrix((np.ones(len(row)), ends), shape=(size, size))
+    label = csgraph.connected_components(graph, directed=False)[1][: len(links)]
+    return [np.unique(np.concatenate([sets[k] for k in np.flatnonzero(label == each)])) for each in np.unique(label)]

@@ -1,0 +1,40 @@
+"""What settles its contact by itself in a network of cracks, each made when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pbem.contact.loads import Load
+from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.preconditioner.subdomains import Subdomain
+from pbem.solve.problem.problem import Problem
+from pbem.solve.tangent.clusters import Clusters
+from pbem.solve.tangent.sweeps import Sweeps
+
+
+class LocalContact:
+    """The groups of this rank that settle before solutions, and clusters around pairs that need it, of one problem."""
+
+    def __init__(
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Sequence[Subdomain]
+    ) -> None:
+        self._problem, self._preconditioner, self._groups = problem, preconditioner, groups
+        self.forget()
+
+    def forget(self) -> None:
+        """Free the storage."""
+        self._sweeps: Sweeps | None = None
+        self._clusters: Clusters | None = None
+
+    def divide(self, load: Load) -> Sweeps:
+        """The groups; under any load of the problem."""
+        if self._sweeps is None:
+            self._sweeps = Sweeps(self._problem, self._preconditioner, self._groups, load)
+        return self._sweeps
+
+    def find_clusters(self, load: Load) -> Clusters:
+        """Clusters; under any load of the problem."""
+        if self._clusters is None:
+            softness = self.divide(load).parts.softness
+            self._clusters = Clusters(self._problem, self._preconditioner, softness, load)
+        return self._clusters

@@ -1,0 +1,213 @@
+"""Clusters of neighbouring pairs: what belongs to them, their stiffness, and searches that end by them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.laws import OPEN, SLIP, STICK
+from pbem.contact.loads import Load
+from pbem.solve.nonlinear.cluster_search import ClusterSearch, stack_states
+from pbem.solve.nonlinear.search import Search
+from pbem.solve.problem.problem import Problem
+from pbem.solve.tangent import clusters as clusters_module
+from pbem.solve.tangent.clusters import Clusters
+from pbem.solve.tangent.krylov import KrylovTangent
+from pbem.solve.tangent.sweeps import Sweeps
+from tests.identities.solving import linearise_pairs
+from tests.unit.test_nearby import draw_modes
+from tests.unit.test_smoothed import write_grid
+from tests.unit.test_sweeps import assemble, grow_branches, many_groups, march_over, write_network
+
+Real = NDArray[np.float64]
+
+HIERARCHICAL = '\nsolver.operator = "hierarchical"'
+
+__all__ = ["many_groups"]  # a fixture
+
+
+def form_clusters(problem: Problem) -> tuple[KrylovTangent, Clusters, Load]:
+    tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)
+    assert isinstance(tangent, KrylovTangent)
+    law = linearise_pairs(problem, draw_modes(problem.mesh.pairs.count), -1.0)
+    tangent.solve(problem.constrain(law, load), load, law)
+    found = tangent.find_clusters(load)
+    assert isinstance(found, Clusters)
+    return tangent, found, load
+
+
+@pytest.fixture
+def grown(many_groups: None) -> Iterator[tuple[Problem, Clusters]]:
+    problem = assemble(grow_branches(1, 10))
+    tangent, clusters, _ = form_clusters(problem)
+    yield problem, clusters
+    tangent.destroy()
+
+
+def choose_pairs(count: int, seed: int, share: float) -> NDArray[np.bool_]:
+    return np.asarray(np.random.default_rng(seed).random(count) < share)
+
+
+@pytest.mark.parametrize("share", [0.003, 0.02, 0.3])
+def test_each_chosen_pair_is_kept_by_one_cluster(grown: tuple[Problem, Clusters], share: float) -> None:
+    problem, clusters = grown
+    chosen = choose_pairs(problem.laws.count, 4, share)
+    assert chosen.any()
+    formed = clusters.form(chosen)
+    kept = np.zeros(len(chosen), dtype=int)
+    for each in formed:
+        assert (np.diff(each.pairs) > 0).all() and (np.diff(each.elements) > 0).all()
+        kept[each.pairs[each.kept]] += 1
+    assert kept.max() == 1 and (kept[problem.laws.leader[chosen]] == 1).all()
+    sizes = [len(each.elements) for each in formed]
+    assert sizes == sorted(sizes, reverse=True)
+    assert max(sizes) <= clusters_module.MOST_ELEMENTS + max(
+        clusters_module.LEAST_AROUND, clusters_module.AROUND * clusters_module.MOST_ELEMENTS)
+    # What is chosen is not at the edge of its cluster: it has elements around it on all sides.
+    assert min(sizes) > clusters_module.LEAST_AROUND
+
+
+def test_nothing_is_formed_around_nothing(grown: tuple[Problem, Clusters]) -> None:
+    problem, clusters = grown
+    nothing = np.zeros(problem.laws.count, dtype=bool)
+    assert clusters.form(nothing) == []
+    values, settled = clusters.solve(nothing, 3, lambda pairs, stiffness: None)
+    assert values.shape == (problem.laws.count, 3) and not settled.any()
+
+
+def test_clusters_far_apart_are_two_and_close_ones_are_joined(grown: tuple[Problem, Clusters]) -> None:
+    problem, clusters = grown
+    along = problem.mesh.position[problem.mesh.pairs.slave].real
+    first, last = np.argmin(along), np.argmax(along)
+    for places, number in (((first, last), 2), ((first, np.argsort(along)[3]), 1)):
+        chosen = np.zeros(len(along), dtype=bool)
+        chosen[list(places)] = True
+        assert len(clusters.form(chosen)) == number
+
+
+def test_a_small_block_is_taken_whole(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = assemble(write_grid(3) + HIERARCHICAL)
+    monkeypatch.setattr(clusters_module, "NEIGHBOURS", 1)
+    monkeypatch.setattr(clusters_module, "LEAST_AROUND", 0)
+    monkeypatch.setattr(clusters_module, "AROUND", 0.0)
+    tangent, clusters, _ = form_clusters(problem)
+    assert problem.parts.block.sum() == 4
+    body = int(np.flatnonzero(problem.parts.block)[0])
+    around, _ = problem.cut.find_around(body)
+    elements = np.unique(problem.mesh.node_element[problem.mesh.pairs.slave[around]])
+    chosen = np.zeros(problem.laws.count, dtype=bool)
+    chosen[around[len(around) // 2]] = True
+    taken = np.unique(np.concatenate([each.elements for each in clusters.form(chosen)]))
+    assert set(elements.tolist()) <= set(taken.tolist())
+    # But for one that is too large.
+    monkeypatch.setattr(clusters_module, "MOST_ELEMENTS", len(elements) - 1)
+    _, fewer, _ = form_clusters(problem)
+    assert [len(each.elements) for each in fewer.form(chosen)] == [1]
+    tangent.destroy()
+
+
+@pytest.mark.parametrize("text", [write_network(), grow_branches(2, 6)], ids=["comb", "branches"])
+def test_the_stiffness_is_that_of_the_whole_model(many_groups: None, text: str) -> None:
+    problem = assemble(text)
+    tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)
+    assert isinstance(tangent, KrylovTangent)
+    law = linearise_pairs(problem, draw_modes(problem.mesh.pairs.count), -1.0)
+    constraints = problem.constrain(law, load)
+    solved = tangent.solve(constraints, load, law)
+    sweeps = Sweeps(problem, tangent.preconditioner, problem.system.groups, load)
+    clusters = tangent.find_clusters(load)
+    assert clusters is not None
+    jumps = stack_states(evaluate_pairs(problem.mesh, law, solved.unknowns))[:, 2:]
+    before = sweeps.find_tractions(constraints, load, solved, jumps)
+    random, seen = np.random.default_rng(3), []
+
+    def compare(pairs: NDArray[np.int64], stiffness: Real) -> None:
+        # What the jumps of these pairs alone change of their tractions, by a product of the whole.
+        change = np.zeros_like(jumps)
+        change[pairs] = random.normal(size=(len(pairs), 2)) * np.abs(jumps).max()
+        moved = (sweeps.find_tractions(constraints, load, solved, jumps + change) - before)[pairs]
+        found = (stiffness @ change[pairs].ravel()).reshape(-1, 2)
+        np.testing.assert_allclose(found, moved, rtol=0, atol=1e-6 * np.abs(moved).max())
+        seen.append(len(pairs))
+
+    _, settled = clusters.solve(choose_pairs(problem.laws.count, 1, 0.02), 1, compare)
+    assert seen and not settled.any()
+    tangent.destroy()
+
+
+def test_values_are_those_of_the_clusters_and_of_the_leaders(grown: tuple[Problem, Clusters]) -> None:
+    problem, clusters = grown
+    chosen, count = choose_pairs(problem.laws.count, 7, 0.03), problem.laws.count
+    formed = clusters.form(chosen)
+    refused = formed[-1].pairs
+    values, settled = clusters.solve(chosen, 2, lambda pairs, stiffness: (
+        None if np.array_equal(pairs, refused) else np.column_stack([pairs, -pairs]).astype(float)))
+    own = problem.laws.leader[settled]
+    np.testing.assert_array_equal(values[settled], np.column_stack([own, -own]))
+    kept = np.zeros(count, dtype=bool)
+    for each in formed[:-1]:
+        kept[each.pairs[each.kept]] = True
+    np.testing.assert_array_equal(settled, kept[problem.laws.leader])
+
+
+def test_clusters_settle_as_long_as_fewer_and_fewer_pairs_change() -> None:
+    problem = assemble(grow_branches(0, 6))
+    count = problem.laws.count
+    load, everywhere = problem.evaluate_load(0, 1.0), np.ones(count, dtype=bool)
+
+    def make(smooth: NDArray[np.bool_]) -> ClusterSearch:
+        return ClusterSearch(problem, None, load, smooth, np.ones(count))  # type: ignore[arg-type]
+
+    def ask(found: ClusterSearch, *counts: int, sweeps: bool = False, level: int = 0) -> bool:
+        search = Search(50, sweeps=sweeps)
+        search.counts, search.level = list(counts), level
+        return found.suits(search)
+
+    clusters = make(everywhere)
+    assert ask(clusters, 5) and not ask(clusters, 0) and not ask(clusters, count)
+    assert not ask(clusters, 5, level=1) and not ask(make(~everywhere), 5)
+    # While groups settle by themselves only the last few pairs.
+    assert ask(clusters, 2, sweeps=True) and not ask(clusters, count // 5, sweeps=True)
+    clusters.counts = [9, 5]
+    assert ask(clusters, 7)
+    clusters.counts = [9, 5, 7]
+    assert ask(clusters, 7)
+    clusters.counts = [9, 5, 7, 6]
+    assert not ask(clusters, 3)
+
+
+def test_searches_end_by_them_in_the_same_state(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = grow_branches(2, 12)
+    settled = []
+    settle = ClusterSearch.settle
+
+    def record(*arguments: object) -> object:
+        settled.append(settle(*arguments))  # type: ignore[arg-type]
+        return settled[-1]
+
+    monkeypatch.setattr(Search, "may_sweep", lambda search: False)
+    monkeypatch.setattr(ClusterSearch, "settle", record)
+    found = march_over(text)
+    assert settled and all(each is not None for each in settled)
+    monkeypatch.setattr(KrylovTangent, "find_clusters", lambda tangent, load: None)
+    usual = march_over(text)
+    assert {STICK, SLIP, OPEN} <= set(usual.contact.mode)
+    np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
+    for name in ("slip", "opening"):
+        expected = getattr(usual.contact, name)
+        np.testing.assert_allclose(getattr(found.contact, name), expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+    assert len(found.iterations) <= 5 < 10 <= len(usual.iterations)
+
+
+def test_blocks_in_a_body_lie_as_they_do_with_the_dense_operator(many_groups: None) -> None:
+    # With an outer boundary, weight, and blocks that hang in open cracks.
+    found, dense = (march_over(write_grid(3) + operator) for operator in (HIERARCHICAL, ""))
+    assert {STICK, SLIP, OPEN} <= set(dense.contact.mode)
+    np.testing.assert_array_equal(found.contact.mode, dense.contact.mode)
+    for name in ("slip", "opening"):
+        expected = getattr(dense.contact, name)
+        np.testing.assert_allclose(getattr(found.contact, name), expected, rtol=0, atol=1e-6 * np.abs(expected).max())

@@ -83,7 +83,9 @@ class ClusterSearch:
         values, settled = clusters.solve(proposal.changed, 6, find)
         if not settled.any():
             return None
-        return _put_modes(problem, modes, proposal, values[:, :2], settled), put_states(state, values[:, 2:], settled)
+        state = put_states(state, values[:, 2:], settled)
+        tangent.expect(stack_states(state))
+        return _put_modes(problem, modes, proposal, values[:, :2], settled), state
 
 
 def _put_modes(

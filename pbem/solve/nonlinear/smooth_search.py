@@ -212,6 +212,7 @@ class SmoothSearch:
             calm = clusters is not None and off <= CALM
             if clusters is not None:
                 state, off = self._settle_clusters(clusters, state, exact, width.fall(part), off)
+                tangent.expect(stack_states(state))
             modes = problem.decide(lambda at=state: (  # type: ignore[misc]
                 read_modes(problem.laws, self.smooth, at, memory, load.pressure)))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))

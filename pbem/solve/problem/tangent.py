@@ -113,6 +113,10 @@ class TangentOperator(Protocol):
         """Modes (m,) on which groups of elements settle by themselves; those that there are where none do."""
         return modes
 
+    def expect(self, states: Real) -> None:
+        """Begin the next solution from states (m, 4) of all pairs, p_n, p_s, g_n, g_s, where it begins from any."""
+        return
+
     def find_clusters(self, load: Load) -> PairClusters | None:
         """Clusters of pairs that can be solved for by themselves; None where solutions of the whole cost less."""
         return None

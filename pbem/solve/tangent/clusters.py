@@ -124,7 +124,7 @@ class Clusters:
 
     def _find_stiffness(self, cluster: Cluster) -> Real:
         """Tractions (2 k,), in units of the traction scale, of the cluster's pairs from their jumps (2 k,), n and s of
-        pair after pair, with all others as they are."""
+        pair after pair, with all others as they are. (theory, 136)"""
         mesh, pairs = self._problem.mesh, cluster.pairs
         around = list_nodes(mesh, cluster.elements)
         asked = number_components(np.searchsorted(around, mesh.pairs.slave[pairs]))

@@ -316,8 +316,13 @@ class KrylovTangent(TangentOperator):
         solved: Solved, judge: Judge,
     ) -> ModeState:
         """See TangentOperator; the next solution begins from the states that go with the modes."""
-        settled, self.expected = self._local.divide(load).settle(constraints, modes, memory, load, law, solved, judge)
+        settled, states = self._local.divide(load).settle(constraints, modes, memory, load, law, solved, judge)
+        self.expect(states)
         return settled
+
+    def expect(self, states: Real) -> None:
+        """See TangentOperator."""
+        self.expected = states
 
     def find_clusters(self, load: Load) -> Clusters | None:
         """See TangentOperator."""

@@ -10,6 +10,7 @@ Comput. 17, 1996; X.-C. Cai, X. Li, SIAM J. Sci. Comput. 33, 2011). Unlike the g
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,13 +21,12 @@ from scipy.spatial import cKDTree
 from pbem.arrays import Bool, Integer, Real
 from pbem.clock import clock
 from pbem.contact.loads import Load
-from pbem.mesh.numbering import list_nodes, number_components
 from pbem.parallel import add_up
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import find_nearest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import SolveCluster
-from pbem.solve.tangent.sweeps import find_pairs, free_jumps, halve_elements
+from pbem.solve.tangent.sweeps import find_pairs, find_softness, free_jumps, halve_elements, take_near
 
 # Elements belong to one cluster if they have one of the so many nearest elements in common.
 NEIGHBOURS = 16
@@ -49,12 +49,9 @@ class Cluster:
 class Clusters:
     """Forms clusters around pairs, and lets them be solved for; alike on all ranks."""
 
-    def __init__(self, problem: Problem, preconditioner: SchwarzPreconditioner, softness: Real, load: Load) -> None:
-        """softness (m, 2, 2): from what is left of the equations of each pair's node to its tractions along n and s."""
-        self._problem, self._softness, self._preconditioner = problem, softness, preconditioner
+    def __init__(self, problem: Problem, preconditioner: SchwarzPreconditioner, load: Load) -> None:
+        self._problem, self._preconditioner, self._load = problem, preconditioner, load
         mesh, follows = problem.mesh, problem.laws.follows
-        matrix = problem.constrain(free_jumps(problem, ~follows), load).matrix
-        self._columns, self._free = matrix.tocsc(), (preconditioner.free @ matrix).tocsr()
         self._pair_of_node = np.full(mesh.nodes, -1)
         self._pair_of_node[mesh.pairs.slave] = np.where(follows, -1, np.arange(mesh.pairs.count))
         self._element = mesh.node_element[mesh.pairs.slave]
@@ -67,13 +64,11 @@ class Clusters:
     def solve(self, chosen: Bool, columns: int, solve: SolveCluster) -> tuple[Real, Bool]:
         """See PairClusters; each rank for some of the clusters."""
         problem, comm = self._problem, self._problem.comm
-        clusters = self.form(chosen)
+        own = self.form(chosen)[comm.rank :: comm.size]
         found = np.zeros((len(chosen), columns + 1))
         with clock.piece("clusters"):
-            for number, each in enumerate(clusters):
-                if number % comm.size != comm.rank:
-                    continue
-                values = solve(each.pairs, self._find_stiffness(each))
+            for each, stiffness in self._list_stiffness(own):
+                values = solve(each.pairs, stiffness)
                 if values is not None:
                     found[each.pairs[each.kept]] = np.column_stack([values, np.ones(len(values))])[each.kept]
         found = add_up(comm, found)[problem.laws.leader]
@@ -122,17 +117,21 @@ class Clusters:
             result += [each] if len(each) <= MOST_ELEMENTS else [own for own in sets if within[own].any()]
         return result
 
-    def _find_stiffness(self, cluster: Cluster) -> Real:
-        """Tractions (2 k,), in units of the traction scale, of the cluster's pairs from their jumps (2 k,), n and s of
-        pair after pair, with all others as they are. (theory, 136)"""
-        mesh, pairs = self._problem.mesh, cluster.pairs
-        around = list_nodes(mesh, cluster.elements)
-        asked = number_components(np.searchsorted(around, mesh.pairs.slave[pairs]))
-        at = np.sort(asked)  # pairs need not be in the order of their nodes
-        formed = self._preconditioner.form_rows(cluster.elements, at, self._columns, self._free)
-        place = np.searchsorted(at, asked)
-        rows = formed[np.ix_(place, place)].reshape(len(pairs), 2, -1)
-        return np.asarray(-(self._softness[pairs] @ rows).reshape(2 * len(pairs), -1))
+    def _list_stiffness(self, clusters: Sequence[Cluster]) -> Iterator[tuple[Cluster, Real]]:
+        """Each of the clusters with what gives tractions (2 k,), in units of the traction scale, of its pairs from
+        their jumps (2 k,), n and s of pair after pair, with all others as they are. (theory, 136)"""
+        problem, preconditioner = self._problem, self._preconditioner
+        if not clusters:
+            return
+        law = free_jumps(problem, ~problem.laws.follows)
+        near = take_near(problem, preconditioner, law, self._load, [each.elements for each in clusters])
+        known = np.unique(np.concatenate([each.pairs for each in clusters]))
+        softness = find_softness(problem, preconditioner, self._load, known)
+        for each in clusters:
+            formed = preconditioner.form_block(near, each.elements, problem.mesh.pairs.slave[each.pairs])
+            rows = formed.reshape(len(each.pairs), 2, -1)
+            stiffness = -(softness[np.searchsorted(known, each.pairs)] @ rows)
+            yield each, stiffness.reshape(2 * len(each.pairs), -1)
 
 
 def _connect(links: list[Integer], sets: list[Integer], count: int) -> list[Integer]:

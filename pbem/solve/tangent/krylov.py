@@ -99,8 +99,7 @@ class KrylovTangent(TangentOperator):
         nearby = answers_nearby(problem)
         self._settling = Settling(MOST_SETTLED if nearby else MOST_SETTLED_BY_GMRES, False, nearby)
         self.widening = 1
-        rows = 2 * len(problem.system.nodes)
-        sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
+        sizes = ((2 * len(problem.system.nodes), problem.unknowns),) * 2
         self._local = LocalContact(problem, preconditioner, groups)
         self._parts, self._by_parts = PartInverses(problem), False
         self._order = find_order(problem)
@@ -189,10 +188,8 @@ class KrylovTangent(TangentOperator):
 
         Raises ConvergenceError: "linear solver".
         """
-        now = self._now
-        begin, least = self.problem.measure(now.residual), self._tolerance * now.scale
-        goal = max(forcing * begin, least)
-        now, count = self._improve(now, goal), 0
+        goal = max(forcing * self.problem.measure(self._now.residual), self._tolerance * self._now.scale)
+        now, count = self._improve(self._now, goal), 0
         if self._by_parts and is_unsolved(self._solver):
             self._by_parts, count = False, self.iterations[-1]
             self.preconditioner.update(constraints)
@@ -316,8 +313,7 @@ class KrylovTangent(TangentOperator):
         solved: Solved, judge: Judge,
     ) -> ModeState:
         """See TangentOperator; the next solution begins from the states that go with the modes."""
-        settled, states = self._local.divide(load).settle(constraints, modes, memory, load, law, solved, judge)
-        self.expect(states)
+        settled, self.expected = self._local.divide(load).settle(constraints, modes, memory, load, law, solved, judge)
         return settled
 
     def expect(self, states: Real) -> None:
@@ -397,9 +393,8 @@ class KrylovTangent(TangentOperator):
 
     def destroy(self) -> None:
         """See TangentOperator."""
-        self._local.forget()
-        self._parts.forget()
-        self._space.forget()
+        for part in (self._local, self._parts, self._space):
+            part.forget()
         self.preconditioner.drop_inverses()
         for item in (self._solver, self._matrix, self._right, self._left):
             item.destroy()

@@ -35,6 +35,5 @@ class LocalContact:
     def find_clusters(self, load: Load) -> Clusters:
         """Clusters; under any load of the problem."""
         if self._clusters is None:
-            softness = self.divide(load).parts.softness
-            self._clusters = Clusters(self._problem, self._preconditioner, softness, load)
+            self._clusters = Clusters(self._problem, self._preconditioner, load)
         return self._clusters

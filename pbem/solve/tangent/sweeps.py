@@ -88,8 +88,9 @@ class Sweeps:
             for own, around in _divide(mesh, groups)
         ]
         divided = [each for each in divided if len(each[2])]
-        near = _take_near(problem, preconditioner, self._jumps, load, [each for each, _, _ in divided])
-        known, softness = self._soften(preconditioner, load, [each for _, each, _ in divided])
+        near = take_near(problem, preconditioner, self._jumps, load, [each for each, _, _ in divided])
+        known = np.unique(np.concatenate([self._held, *(each for _, each, _ in divided)]))
+        softness = find_softness(problem, preconditioner, load, known)
         stiffness: list[Single] = []
         none, first = np.zeros(0, dtype=np.int64), np.cumsum([0, *(len(each) for _, each, _ in divided)])
         self.parts = Parts(
@@ -102,18 +103,6 @@ class Sweeps:
             formed = self.parts.soften(each) @ formed.reshape(len(each), 2, -1)
             stiffness.append(-formed.reshape(2 * len(each), -1).astype(np.float32))
         give_back()
-
-    def _soften(
-        self, preconditioner: SchwarzPreconditioner, load: Load, parts: Sequence[Integer]
-    ) -> tuple[Integer, Real]:
-        """See `Parts`: known pairs, those of parts among them, and their softness."""
-        problem, slave = self._problem, self._problem.mesh.pairs.slave
-        known = np.unique(np.concatenate([self._held, *parts]))
-        nodes = np.sort(slave[known])
-        closed = problem.constrain(free_jumps(problem, np.zeros(problem.laws.count, dtype=bool)), load)
-        # The tractions of a crack's pair are in its own node's equations alone.
-        own_equations = preconditioner.take_near(closed.matrix, nodes).take_blocks()
-        return known, np.linalg.inv(own_equations[np.searchsorted(nodes, slave[known])])
 
     def settle(
         self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
@@ -219,12 +208,24 @@ def halve_elements(middle: Complex, elements: Integer, most: int) -> Iterator[In
         yield from halve_elements(middle, np.sort(elements[half]), most)
 
 
-def _take_near(
+def take_near(
     problem: Problem, preconditioner: SchwarzPreconditioner, law: Linearisation, load: Load, parts: Sequence[Integer]
 ) -> NearMap:
     """The constraint map of a law, of the nodes of parts' elements."""
     elements = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *parts]))
     return preconditioner.take_near(problem.constrain(law, load).matrix, list_nodes(problem.mesh, elements))
+
+
+def find_softness(
+    problem: Problem, preconditioner: SchwarzPreconditioner, load: Load, pairs: Integer
+) -> Real:
+    """The softness (k, 2, 2) of pairs (k,), rising: see `Parts`."""
+    slave = problem.mesh.pairs.slave[pairs]
+    nodes = np.sort(slave)
+    closed = problem.constrain(free_jumps(problem, np.zeros(problem.laws.count, dtype=bool)), load)
+    # The tractions of a crack's pair are in its own node's equations alone.
+    own_equations = preconditioner.take_near(closed.matrix, nodes).take_blocks()
+    return np.asarray(np.linalg.inv(own_equations[np.searchsorted(nodes, slave)]))
 
 
 def find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer:

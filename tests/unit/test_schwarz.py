@@ -14,9 +14,10 @@ from pbem.case.build import parse_model
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.numbering import number_components
 from pbem.parallel import world
-from pbem.solve.preconditioner import schwarz
 from pbem.solve.preconditioner import subdomains as groups
+from pbem.solve.preconditioner.near_map import NearMap, take_near
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
@@ -218,18 +219,35 @@ def test_groups_may_overlap_all_others(many_groups: None, monkeypatch: pytest.Mo
     np.testing.assert_allclose(exact @ apply(preconditioner, residual), residual, rtol=0, atol=1e-9)
 
 
-def test_constraint_maps_are_compared_some_rows_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    before, matrix = (sparse.random(60, 30, 0.1, "csr", random_state=seed) for seed in (1, 2))
-    monkeypatch.setattr(schwarz, "COMPARED", 7)
+def take_map(seed: int, own: NDArray[np.int64], beyond: NDArray[np.int64]) -> tuple[sparse.csr_matrix, NearMap]:
+    """A map of 15 nodes, and what groups need of it that see some of them; free terms of these alone."""
+    matrix = sparse.random(60, 30, 0.1, "csr", random_state=seed)
+    nodes = np.concatenate([own, beyond])
+    free = sparse.coo_matrix((np.arange(1.0, 2 * len(nodes) + 1), (np.arange(2 * len(nodes)), number_components(nodes))),
+                             shape=(2 * len(nodes), 60)).tocsr()
+    return matrix, take_near(matrix, free, own, beyond)
+
+
+SEEN = np.array([3, 4, 9]), np.array([0, 7])
+
+
+def test_constraint_maps_are_compared_column_by_column() -> None:
+    (before, former), (matrix, near) = (take_map(seed, *SEEN) for seed in (1, 2))
     largest = np.maximum(abs(before).max(axis=0).toarray(), abs(matrix).max(axis=0).toarray()).ravel()
     change = abs(matrix - before).max(axis=0).toarray().ravel()
     expected = np.divide(change, largest, out=np.zeros(30), where=change > 0)
-    np.testing.assert_array_equal(schwarz._measure_changes(before, matrix), expected)
+    np.testing.assert_array_equal(near.measure_changes(former), expected[number_components(np.concatenate(SEEN))])
+    assert not near.measure_changes(near).any() and np.isinf(near.measure_changes(None)).all()
 
 
 def test_of_a_constraint_map_the_columns_that_are_seen_are_taken() -> None:
-    matrix = sparse.random(60, 30, 0.1, "csr", random_state=3)
-    chosen = np.arange(30) % 3 == 1
-    taken = schwarz._take_columns(matrix, chosen)
-    np.testing.assert_array_equal(taken.toarray(), np.where(chosen, matrix.toarray(), 0.0))
-    assert taken.nnz == matrix.tocsc()[:, chosen].nnz
+    matrix, near = take_map(3, *SEEN)
+    nodes = np.concatenate(SEEN)
+    np.testing.assert_array_equal(near.columns.toarray(), matrix.toarray()[:, number_components(nodes)])
+    np.testing.assert_array_equal(near.find_nodes(np.array([0, 9, 3])), [3, 2, 0])
+    # The block of a node's own unknowns in its own equations: here of its displacements alone, times their terms.
+    own = [matrix.toarray()[np.ix_(number_components(nodes[k : k + 1]), number_components(nodes[k : k + 1]))]
+           for k in range(len(nodes))]
+    terms = np.arange(1.0, 2 * len(nodes) + 1).reshape(-1, 2, 1)
+    np.testing.assert_allclose(near.take_blocks(), terms * np.array(own), rtol=1e-15)
+    assert near.take_blocks().any()

@@ -221,10 +221,10 @@ def test_groups_may_overlap_all_others(many_groups: None, monkeypatch: pytest.Mo
 
 def take_map(seed: int, own: NDArray[np.int64], beyond: NDArray[np.int64]) -> tuple[sparse.csr_matrix, NearMap]:
     """A map of 15 nodes, and what groups need of it that see some of them; free terms of these alone."""
-    matrix = sparse.random(60, 30, 0.1, "csr", random_state=seed)
-    nodes = np.concatenate([own, beyond])
-    free = sparse.coo_matrix((np.arange(1.0, 2 * len(nodes) + 1), (np.arange(2 * len(nodes)), number_components(nodes))),
-                             shape=(2 * len(nodes), 60)).tocsr()
+    matrix = sparse.random(60, 30, 0.4, "csr", random_state=seed)
+    nodes = number_components(np.concatenate([own, beyond]))
+    terms = (np.arange(1.0, len(nodes) + 1), (np.arange(len(nodes)), nodes))
+    free = sparse.coo_matrix(terms, shape=(len(nodes), 60)).tocsr()
     return matrix, take_near(matrix, free, own, beyond)
 
 

@@ -64,6 +64,7 @@ def test_a_crack_close_to_the_side_of_a_strip(order: int, tmp_path: Path) -> Non
     assert one.tips["crack"].KI[-1] == pytest.approx(other.tips["crack"].KI[-1], rel=1e-3)
 
 
-def test_the_faces_are_told() -> None:
-    mesh = generate_mesh(build_model(make_strip("THST", 2, (0.0, 0.3), True)))
-    assert "keeps the displacement equation on left, right, beside crack" in " ".join(mesh.notes)
+@pytest.mark.parametrize(("part", "told"), [(0.3, "bottom, right, top, left"), (0.05, "left")])
+def test_the_faces_that_are_near_are_told(part: float, told: str) -> None:
+    mesh = generate_mesh(build_model(make_strip("THST", 2, (0.0, part), True)))
+    assert f"keeps the displacement equation on {told}, beside crack" in " ".join(mesh.notes)

@@ -16,10 +16,18 @@ from pbem.arrays import Bool, Real
 from pbem.contact.complementarity import Subset
 from pbem.contact.laws import OPEN, ModeState, PairState, plastic_slip
 from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, Proposal, linearise
-from pbem.contact.smoothed import linearise_smoothly, measure_violation, read_modes, take_off_proximal
+from pbem.contact.smoothed import (
+    linearise_smoothly,
+    measure_violation,
+    read_modes,
+    stiffen_jumps,
+    take_off_proximal,
+)
 
 # Newton's steps of each width, and with the true laws, at most.
 MOST_STEPS, MOST_AT_END = 20, 30
+# Widths on the way to the last one, at most.
+MOST_WIDTHS = 16
 # Of the way to a solution the whole is gone if that leaves BETTER of what pairs were off, in the mean, in which none
 # counts for more than FARTHEST widths; else the part that leaves least.
 PARTS = (1.0, 0.9, 0.75, 0.5, 0.3, 0.15, 0.05)
@@ -38,7 +46,7 @@ Judge = Callable[[ModeState, PairState], Proposal]
 @dataclass(frozen=True)
 class ClusterContact:
     """The k pairs of a cluster: their subset, those that can be smoothed (k,), and the stiffness (2 k, 2 k) that gives
-    tractions from jumps, n and s of pair after pair; exact: a state on which it acts. scale: traction scale (stress).
+    tractions, in units of `scale` (stress), from jumps, n and s of pair after pair; exact: a state to which it adds.
     """
 
     subset: Subset
@@ -54,7 +62,8 @@ class ClusterContact:
         proximal (k,): stiffness against the change of the jumps in a step (stress/length).
         """
         found = self._approach(state, width, proximal, NEAR)
-        if found is None or self._measure_off(found[0], width)[0] > self._measure_off(state, width)[0]:
+        # Not one that is no number either.
+        if found is None or not self._measure_off(found[0], width)[0] <= self._measure_off(state, width)[0]:
             return None
         return found[0]
 
@@ -83,10 +92,11 @@ class ClusterContact:
         return state, exact
 
     def narrow(self, state: PairState, shape: Real, last: float) -> PairState | None:
-        """The state near to the smoothed laws of the width `last`, by way of larger ones, each times shape (k,)."""
+        """The state near to the smoothed laws of the width `last` > 0, by way of larger ones, each times shape (k,);
+        None if there is none, or it is too far."""
         contact, proximal = self, PROXIMAL * self.subset.laws.own_stiffness
         width = max(FIRST * float(self._find_violation(state, 0.0).max(initial=0.0)), last)
-        while True:
+        for _ in range(MOST_WIDTHS):
             found = contact._approach(state, width * shape, proximal, NEAR_ON_WAY)
             if found is None:
                 return None
@@ -95,6 +105,7 @@ class ClusterContact:
                 return state
             contact = ClusterContact(self.subset, self.smooth, self.stiffness, found[1], self.scale)
             width = max(NEXT * width, last)
+        return None
 
     def end(self, state: PairState, judge: Judge) -> tuple[ModeState, PairState] | None:
         """The modes that the judge leaves as they are, and their state, by Newton's steps with the true laws from those
@@ -104,7 +115,7 @@ class ClusterContact:
         for _ in range(MOST_AT_END):
             law = linearise(laws, modes, state.p_n, plastic_slip(laws, state), memory, pressure, self.scale)
             stiffness = np.where(modes.mode == OPEN, PROXIMAL * laws.own_stiffness, 0.0)
-            found = self._solve(_stiffen(law, state, stiffness), exact)
+            found = self._solve(stiffen_jumps(law, state, stiffness), exact)
             if found is None:
                 return None
             exact = found
@@ -146,13 +157,3 @@ class ClusterContact:
             return None
         values = offset + (tangent @ x.reshape(count, 2, 1))[..., 0]
         return PairState(values[:, P_N] * scale, values[:, P_S] * scale, values[:, G_N], values[:, G_S])
-
-
-def _stiffen(law: Linearisation, state: PairState, stiffness: Real) -> Linearisation:
-    """The laws of open pairs with a stiffness (k,) against the change of their jumps (theory, 127)."""
-    at = np.flatnonzero(stiffness)
-    tangent, offset = law.tangent.copy(), law.offset.copy()
-    for unknown, traction, jump in ((0, P_N, state.g_n), (1, P_S, state.g_s)):
-        tangent[at, traction, unknown] = stiffness[at]
-        offset[at, traction] -= stiffness[at] * jump[at]
-    return Linearisation(tangent, offset, law.leader)

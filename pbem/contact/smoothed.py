@@ -13,6 +13,8 @@ Rockafellar, SIAM J. Control Optim. 14, 1976; theory, 127).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pbem.arrays import Bool, Real
@@ -111,6 +113,17 @@ def take_off_proximal(
         _find_plastic(laws, state), _find_plastic(laws, before), strict=True))
     return PairState(state.p_n - by_n, state.p_s - by_s,
                      state.g_n - laws.compliance_n * by_n, state.g_s - laws.compliance_s * by_s)
+
+
+def stiffen_jumps(law: Linearisation, state: PairState, stiffness: Real) -> Linearisation:
+    """The linearised laws of open pairs with a stiffness (m,), stress/length, against the change of their jumps from a
+    state; where it is zero, as they are. (theory, 127)"""
+    at = np.flatnonzero(stiffness)
+    tangent, offset = law.tangent.copy(), law.offset.copy()
+    for unknown, traction, jump in ((0, P_N, state.g_n), (1, P_S, state.g_s)):
+        tangent[at, traction, unknown] = stiffness[at]
+        offset[at, traction] -= stiffness[at] * jump[at]
+    return replace(law, tangent=tangent, offset=offset)
 
 
 def read_modes(

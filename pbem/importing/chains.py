@@ -24,6 +24,8 @@ WIDEST, WIDEST_UNTOLD, WIDEST_BENT = 46.0, 31.0, 91.0
 EQUAL = 1e-3
 # An edge of higher order is an arc if its nodes are off it by no more than this part of its rise.
 ROUND = 0.15
+# Of edges without nodes between their ends it is not known whether they are curved.
+UNKNOWN = -1
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,16 @@ class Chain:
     nodes: tuple[int, ...]
     entities: tuple[int, ...]
 
-    def place(self, nodes: Mapping[int, complex], between: Mapping[Edge, tuple[int, ...]]) -> _Path:
-        """The chain by the places of its nodes, among them those between the ends of edges."""
-        inner = []
+    def place(self, nodes: Mapping[int, complex], between: Mapping[Edge, tuple[int, ...]], off: float) -> _Path:
+        """The chain by the places of its nodes, among them those between the ends of edges; off: how far from its chord
+        the nodes of a straight edge may be."""
+        fine, at, bent = [nodes[self.nodes[0]]], [0], []
         for a, b in itertools.pairwise(self.nodes):
             own = between.get((min(a, b), max(a, b)), ())
-            inner.append(np.array([nodes[each] for each in (own if a < b else own[::-1])], dtype=complex))
-        return _Path(np.array([nodes[node] for node in self.nodes]), np.array(self.entities), inner)
+            fine += [nodes[each] for each in (*(own if a < b else own[::-1]), b)]
+            at.append(len(fine) - 1)
+            bent.append(not _is_straight(np.array(fine[at[-2]:]), off) if own else UNKNOWN)
+        return _Path(np.array(fine), np.array(at), np.array(self.entities), np.array(bent))
 
     @property
     def closed(self) -> bool:
@@ -48,38 +53,44 @@ class Chain:
 
 @dataclass(frozen=True)
 class _Path:
-    """points (n,): ends of edges; entities (n - 1,): of each edge; inner: places of the nodes between its ends."""
+    """fine: all points, those between the ends of edges among them; at (n,): where the ends are among them. entities
+    (n - 1,): of each edge; bent (n - 1,): 1 if its nodes say that it is curved, 0 if straight, else UNKNOWN.
 
-    points: Complex
+    Parts of it are slices: a run grows edge by edge.
+    """
+
+    fine: Complex
+    at: Integer
     entities: Integer
-    inner: list[Complex]
+    bent: Integer
 
     def part(self, first: int, last: int) -> _Path:
         """The edges between two points."""
-        return _Path(self.points[first:last + 1], self.entities[first:last], self.inner[first:last])
+        begin, end = self.at[first], self.at[last]
+        return _Path(self.fine[begin:end + 1], self.at[first:last + 1] - begin, self.entities[first:last],
+                     self.bent[first:last])
 
     def turn_to(self, first: int) -> _Path:
         """The same closed path from another point on."""
-        points = np.concatenate([self.points[first:-1], self.points[:first + 1]])
-        return _Path(points, np.roll(self.entities, -first), self.inner[first:] + self.inner[:first])
+        cut = self.at[first]
+        fine = np.concatenate([self.fine[cut:-1], self.fine[:cut + 1]])
+        at = np.concatenate([[0], np.cumsum(np.roll(np.diff(self.at), -first))])
+        return _Path(fine, at, np.roll(self.entities, -first), np.roll(self.bent, -first))
+
+    @property
+    def points(self) -> Complex:
+        """Ends of edges (n,)."""
+        return self.fine[self.at]
 
     @property
     def edges(self) -> int:
         """Number of edges."""
-        return len(self.inner)
+        return len(self.entities)
 
     @property
-    def fine(self) -> Complex:
-        """All points, those between the ends of edges among them."""
-        parts = [part for start, own in zip(self.points, self.inner, strict=False) for part in ([start], own)]
-        return np.concatenate([*parts, self.points[-1:]])
-
-    def is_bent(self, off: float) -> bool | None:
+    def is_bent(self) -> bool | None:
         """Whether all edges are known to be curved; None if nothing is known of any."""
-        known = [len(own) > 0 for own in self.inner]
-        if not any(known):
-            return None
-        return all(known) and not any(_is_straight(self.part(k, k + 1).fine, off) for k in range(self.edges))
+        return None if (self.bent == UNKNOWN).all() else bool((self.bent == 1).all())
 
 
 def link(edges: Sequence[Edge], entities: Mapping[Edge, int], corners: set[int]) -> list[Chain]:
@@ -118,8 +129,8 @@ def fit_legs(
     nodes: places by tag; between: tags of the nodes of edges of higher order, by the edges' ends. A circle is four
     legs, from the angle 0 on.
     """
-    path = chain.place(nodes, between)
     off = OFF * extent
+    path = chain.place(nodes, between, off)
     if chain.closed:
         if chain.nodes[0] not in corners:
             first = _run(path, 0, off)
@@ -127,7 +138,7 @@ def fit_legs(
                 # Where the first run ends another one begins, whatever the node where the chain was begun.
                 path = path.turn_to(first)
         circle = _fit_circle(path.fine[:-1], off)
-        if circle is not None and _is_round(path, off):
+        if circle is not None and _is_round(path):
             return _draw_circle(*circle, path.edges, extent)
     legs = []
     first = 0
@@ -143,13 +154,13 @@ def _run(path: _Path, first: int, off: float) -> int:
     straight = first
     while straight < path.edges and _is_straight(path.part(first, straight + 1).fine, off):
         straight += 1
-    bent = path.part(first, first + 1).is_bent(off)
+    bent = path.part(first, first + 1).is_bent
     if straight > first + 1 or straight == path.edges or bent is False:
         return max(straight, first + 1)
     last = first + 1
     for end in range(first + 2 if bent is None else first + 1, path.edges + 1):
         part = path.part(first, end)
-        if abs(part.points[0] - part.points[-1]) <= off or not _is_round(part, off):
+        if abs(part.points[0] - part.points[-1]) <= off or not _is_round(part):
             break
         if len(part.fine) > 3 and _fit_circle(part.fine, off) is None:
             break
@@ -184,9 +195,9 @@ def _is_straight(points: Complex, off: float) -> bool:
     return bool((np.abs(local.imag) * abs(along) <= off).all() and (np.diff(local.real) > 0).all())
 
 
-def _is_round(path: _Path, off: float) -> bool:
+def _is_round(path: _Path) -> bool:
     """Whether the edges turn by the same sign everywhere, and by less than a polygon's would."""
-    bent = path.is_bent(off)
+    bent = path.is_bent
     if bent is False:
         return False
     steps = np.diff(path.fine)

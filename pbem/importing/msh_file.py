@@ -63,7 +63,8 @@ class Grid:
             if own:
                 self.between[min(a, b), max(a, b)] = own if a < b else own[::-1]
         # An element of several groups stands once for each of them in files of version 2.2.
-        first = self.groups.setdefault(frozenset(corners), group)
+        first = self.groups.setdefault(frozenset(corners), group) or group
+        self.groups[frozenset(corners)] = first
         if first and first != group:
             if SEVERAL not in self.notes:
                 self.notes.append(SEVERAL)

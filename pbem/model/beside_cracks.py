@@ -13,7 +13,8 @@ from pbem.geometry.intersection import measure_distances
 from pbem.geometry.tolerance import TIE
 from pbem.model.model import Model, Region
 
-# Faces are beside a crack if no farther away than this part of its extent. With traction equations on them K of a crack
+# Faces are beside a crack if no farther away than so many times its extent, which is twice the distance of its points
+# from their mean at most. With traction equations on them K of a crack
 # from the side of a strip to 0.6 of its width was 5 to 30 % too large at order 1 and 4 to 6 % at order 2, and on finer
 # meshes no less.
 BESIDE = 8.0 * (1 + TIE)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pbem.contact.constraints import evaluate_pairs
-from pbem.contact.laws import OPEN, SLIP, STICK
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.contact.loads import Load
+from pbem.contact.modes import Proposal
 from pbem.solve.nonlinear.cluster_search import ClusterSearch, stack_states
 from pbem.solve.nonlinear.search import Search
 from pbem.solve.problem.problem import Problem
@@ -110,6 +112,28 @@ def test_a_small_block_is_taken_whole(many_groups: None, monkeypatch: pytest.Mon
     tangent.destroy()
 
 
+def test_of_neighbouring_blocks_as_many_are_taken_whole_as_there_is_room_for(
+    many_groups: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = assemble(write_grid(4) + HIERARCHICAL)
+    tangent, clusters, _ = form_clusters(problem)
+    assert problem.parts.block.sum() == 9
+    element = problem.mesh.node_element[problem.mesh.pairs.slave]
+    blocks = [np.unique(element[problem.cut.find_around(body)[0]]) for body in np.flatnonzero(problem.parts.block)]
+    # In a corner of every block one pair.
+    chosen = np.zeros(problem.laws.count, dtype=bool)
+    for block in blocks:
+        chosen[np.flatnonzero(element == block[0])[0]] = True
+    whole = 0
+    monkeypatch.setattr(clusters_module, "LEAST_AROUND", 0)
+    monkeypatch.setattr(clusters_module, "AROUND", 0.0)
+    for each in clusters.form(chosen):
+        assert len(each.elements) <= clusters_module.MOST_ELEMENTS
+        whole += sum(bool(np.isin(block, each.elements).all()) for block in blocks)
+    assert whole >= 3
+    tangent.destroy()
+
+
 @pytest.mark.parametrize("text", [write_network(), grow_branches(2, 6)], ids=["comb", "branches"])
 def test_the_stiffness_is_that_of_the_whole_model(many_groups: None, text: str) -> None:
     problem = assemble(text)
@@ -162,22 +186,27 @@ def test_clusters_settle_as_long_as_fewer_and_fewer_pairs_change() -> None:
     def make(smooth: NDArray[np.bool_]) -> ClusterSearch:
         return ClusterSearch(problem, None, load, smooth, np.ones(count))  # type: ignore[arg-type]
 
-    def ask(found: ClusterSearch, *counts: int, sweeps: bool = False, level: int = 0) -> bool:
+    def ask(
+        found: ClusterSearch, changed: int, *clustered: int, sweeps: bool = False, level: int = 0, first: bool = False
+    ) -> bool:
         search = Search(50, sweeps=sweeps)
-        search.counts, search.level = list(counts), level
+        search.counts, search.level = [changed] if first else [9, changed], level
+        search.clustered = list(clustered)
         return found.suits(search)
 
     clusters = make(everywhere)
     assert ask(clusters, 5) and not ask(clusters, 0) and not ask(clusters, count)
-    assert not ask(clusters, 5, level=1) and not ask(make(~everywhere), 5)
+    assert not ask(clusters, 5, level=1) and not ask(make(~everywhere), 5) and not ask(clusters, 5, first=True)
     # While groups settle by themselves only the last few pairs.
     assert ask(clusters, 2, sweeps=True) and not ask(clusters, count // 5, sweeps=True)
-    clusters.counts = [9, 5]
-    assert ask(clusters, 7)
-    clusters.counts = [9, 5, 7]
-    assert ask(clusters, 7)
-    clusters.counts = [9, 5, 7, 6]
-    assert not ask(clusters, 3)
+    assert ask(clusters, 7, 9, 5) and ask(clusters, 7, 9, 5, 4) and not ask(clusters, 3, 9, 5, 7, 6)
+    # A search that begins anew, as from the modes of smoothed laws, knows nothing of that.
+    search = Search(50)
+    search.counts, search.clustered = [9, 3], [9, 5, 7, 6]
+    assert not clusters.suits(search)
+    search.go_on_from_smoothed()
+    search.counts = [3]
+    assert clusters.suits(search)
 
 
 def test_searches_end_by_them_in_the_same_state(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -211,3 +240,50 @@ def test_blocks_in_a_body_lie_as_they_do_with_the_dense_operator(many_groups: No
     for name in ("slip", "opening"):
         expected = getattr(dense.contact, name)
         np.testing.assert_allclose(getattr(found.contact, name), expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def settle_once(text: str, solve: Callable[..., tuple[Real, NDArray[np.bool_]]] | None) -> tuple[Search, object]:
+    """A search after one solution in which all pairs are open and one is to close, and what clusters lead to; solve: in
+    place of theirs."""
+    problem = assemble(text)
+    tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)
+    modes = ModeState(np.full(problem.laws.count, OPEN, dtype=np.int8), np.ones(problem.laws.count))
+    law = linearise_pairs(problem, modes, -1.0)
+    solved = tangent.solve(problem.constrain(law, load), load, law)
+    state, search = evaluate_pairs(problem.mesh, law, solved.unknowns), Search(50)
+    closed = ModeState(np.full(problem.laws.count, STICK, dtype=np.int8), modes.sign)
+    search.note(Proposal(closed, np.where(np.arange(problem.laws.count) < 1, 1.0, 0.0)))
+    found = ClusterSearch(problem, start_memory(problem.laws), load, np.ones(len(modes.mode), dtype=bool),
+                          np.ones(len(modes.mode)))
+    with pytest.MonkeyPatch.context() as patch:
+        if solve is not None:
+            patch.setattr(Clusters, "solve", solve)
+        settled = found.settle(tangent, search, modes, law, solved, state)
+    tangent.destroy()
+    return search, settled
+
+
+def test_faces_that_bear_nothing_have_a_last_width_all_the_same(many_groups: None) -> None:
+    # All open: tractions are zero to the last bit, and no part of them would end.
+    search, _ = settle_once(write_network(), None)
+    assert search.clustered == [1]
+
+
+def test_clusters_that_give_back_the_modes_that_there_are_do_not_count(many_groups: None) -> None:
+    def give_back(clusters: Clusters, chosen: NDArray[np.bool_], columns: int, solve: object) -> tuple[
+        Real, NDArray[np.bool_]
+    ]:
+        values = np.zeros((len(chosen), columns))
+        values[:, 0], values[:, 1] = OPEN, 1.0
+        return values, np.ones(len(chosen), dtype=bool)
+
+    search, settled = settle_once(write_network(), give_back)
+    assert settled is None and not search.swept
+
+    def close(*arguments: Any) -> tuple[Real, NDArray[np.bool_]]:
+        values, settled = give_back(*arguments)
+        values[0, 0] = STICK
+        return values, settled
+
+    search, settled = settle_once(write_network(), close)
+    assert settled is not None and search.swept

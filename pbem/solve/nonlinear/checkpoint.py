@@ -42,7 +42,6 @@ GIVEN = {
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
     "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape", "_along", "_alone"),
     "blocks": ("_problem", "_smooth", "_own"),
-    "clusters": ("_problem", "_memory", "_load", "_smooth", "_shape"),
 }
 
 

@@ -19,7 +19,7 @@ from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal
-from pbem.solve.nonlinear.judging import make_judge
+from pbem.solve.nonlinear.judging import find_floor, make_judge
 from pbem.solve.nonlinear.search import Search
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Solved, TangentOperator
@@ -35,7 +35,8 @@ NARROWEST = 1e-10
 
 
 class ClusterSearch:
-    """Whether clusters are to settle in a search, and the modes that they lead to; alike on all ranks.
+    """Whether clusters are to settle in a search, and the modes that they lead to; alike on all ranks. Without a memory
+    of its own: what it did is noted in the search.
 
     smooth (m,): pairs whose laws can be smoothed; none where those of others cannot. shape (m,): by what the widths of
     the laws are multiplied.
@@ -44,14 +45,15 @@ class ClusterSearch:
     def __init__(self, problem: Problem, memory: Memory, load: Load, smooth: Bool, shape: Real) -> None:
         self._problem, self._memory, self._load = problem, memory, load
         self._smooth, self._shape = smooth, shape
-        self.counts: list[int] = []  # of pairs that changed when clusters settled
 
     def suits(self, search: Search) -> bool:
-        """Whether clusters are to settle next: as long as fewer and fewer pairs change."""
-        before, lately = self.counts[:-PATIENCE], self.counts[-PATIENCE:]
+        """Whether clusters are to settle next: as long as fewer and fewer pairs change, after a plain step."""
+        before, lately = search.clustered[:-PATIENCE], search.clustered[-PATIENCE:]
         falls = not before or min(lately) < min(before)
         changed, count = search.counts[-1], self._problem.laws.count
         if not (falls and 0 < changed <= MOST * count and self._smooth.any()) or search.level:
+            return False
+        if len(search.counts) < 2 and not search.smoothed:
             return False
         return changed <= FEW * count or not search.may_sweep()
 
@@ -60,7 +62,7 @@ class ClusterSearch:
         state: PairState,
     ) -> tuple[ModeState, PairState] | None:
         """Modes and states (m,) of all pairs, with those of the clusters around the ones that change, and what all else
-        asks for; None if no cluster settles. All ranks together.
+        asks for; None if no cluster settles, or what is near says otherwise than the whole did. All ranks together.
 
         law, solved: linearised at the modes, and the solution; state: of the pairs in it.
         """
@@ -68,9 +70,13 @@ class ClusterSearch:
         clusters = tangent.find_clusters(load)
         if clusters is None:
             return None
-        self.counts.append(search.counts[-1])
         exact = evaluate_pairs(problem.mesh, law, solved.unknowns)
-        last = NARROWEST * float(max(np.abs(exact.p_n).max(), np.abs(exact.p_s).max()))
+        # Tractions are rounding where all faces are apart.
+        last = NARROWEST * float(max(np.abs(exact.p_n + load.pressure).max(), np.abs(exact.p_s).max(),
+                                     find_floor(problem, solved)))
+        if not 0 < last < np.inf:
+            return None
+        search.clustered.append(search.counts[-1])
         judge = make_judge(problem, solved, search.globalisation)
 
         def find(pairs: Integer, stiffness: Real) -> Real | None:
@@ -81,11 +87,13 @@ class ClusterSearch:
             return np.column_stack([found[0].mode, found[0].sign, stack_states(found[1])]) if found else None
 
         values, settled = clusters.solve(proposal.changed, 6, find)
-        if not settled.any():
+        chosen = _put_modes(problem, modes, proposal, values[:, :2], settled)
+        if not settled.any() or chosen.fingerprint() == modes.fingerprint():
             return None
+        search.swept = True
         state = put_states(state, values[:, 2:], settled)
         tangent.expect(stack_states(state))
-        return _put_modes(problem, modes, proposal, values[:, :2], settled), state
+        return chosen, state
 
 
 def _put_modes(

@@ -22,7 +22,6 @@ from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import Cascade, run_cascade
 from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain, begin_course
-from pbem.solve.nonlinear.cluster_search import ClusterSearch
 from pbem.solve.nonlinear.damped import can_be_damped, rest_late
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
@@ -126,7 +125,6 @@ def _search_modes(
         "hold": Hold(problem, memory, load), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
         "smoothing": smoothing, "running": RunningGroup(problem, tangent),
         "blocks": OpenBlocks(problem, smoothing.smooth),
-        "clusters": smoothing.make_cluster_search(),
     }
     checkpoint = Checkpoint(tangent, load, iterations, parts)
     course = checkpoint.resume(resumed) if resumed else None
@@ -156,13 +154,13 @@ class _Run:
         refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
         checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
         fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup, blocks: OpenBlocks,
-        clusters: ClusterSearch,
     ) -> None:
         """See _search_modes; course: with which it begins, None at its first iteration."""
         self.problem, self.laws, self.tangent, self.load, self.reporter = problem, problem.laws, tangent, load, reporter
         self.refuse, self.hurried, self.iterations, self.checkpoint = refuse, hurried, iterations, checkpoint
         self.hold, self.search, self.forcing, self.fixed_point = hold, search, forcing, fixed_point
-        self.smoothing, self.running, self.blocks, self.clusters = smoothing, running, blocks, clusters
+        self.smoothing, self.running, self.blocks = smoothing, running, blocks
+        self.clusters = smoothing.make_cluster_search()
         course = course or begin_course(hold, len(iterations) // PATIENCE)
         self.modes, self.normal_traction, self.slip, self.jump = (
             course.modes, course.normal_traction, course.slip, course.jump)
@@ -331,15 +329,18 @@ class _Run:
         return rest or find_rest(self.running, self.hold, self.tangent, found.constraints, self.modes, self.memory,
                                  self.load, found.law, found.solved, self.search)
 
-    def _choose_modes(self, found: _Iterated, cascade: Cascade | None, rest: Rest | None) -> ModeState:
-        """The modes to go on with: those of a cascade of failures, or of a state of rest, of pivoting, or of some of
-        the pairs that want others."""
+    def _choose_modes(
+        self, found: _Iterated, cascade: Cascade | None, rest: Rest | None
+    ) -> tuple[ModeState, PairState]:
+        """The modes to go on with: those of a cascade of failures, or of a state of rest, of clusters that settle by
+        themselves, of pivoting, or of some of the pairs that want others. And the state that goes with them."""
         search, proposal = self.search, found.outcome.proposal
         chosen = cascade.modes if cascade else rest.modes if rest else None
         # The first rank alone knows which pairs hold a body.
         share = broadcast(self.problem.comm, max(search.globalisation.share, self.hold.share))
-        if chosen is None:
-            chosen = self._settle_clusters(found)
+        state = found.outcome.pairs
+        if chosen is None and (settled := self._settle_clusters(found)):
+            chosen, state = settled
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
         if chosen is None and not (share > search.globalisation.share):
             chosen = pivot_group(self.hold, self.tangent, found.constraints, self.modes, self.memory, self.load,
@@ -350,18 +351,18 @@ class _Run:
             back = bool(proposal.changed.any()) and search.returns(chosen.fingerprint())
         if back and not go_on_warily(self.forcing, search):
             raise end_search(self.hold, "mode cycle", self.modes, proposal, search)
-        return chosen
+        return chosen, state
 
-    def _settle_clusters(self, found: _Iterated) -> ModeState | None:
-        """The modes that clusters around the pairs that change settle on by themselves; None where none do."""
+    def _settle_clusters(self, found: _Iterated) -> tuple[ModeState, PairState] | None:
+        """The modes that clusters around the pairs that change settle on by themselves, and the state; None where none
+        do."""
         if not self.clusters.suits(self.search):
             return None
         settled = self.clusters.settle(
             self.tangent, self.search, self.modes, found.law, found.solved, found.outcome.pairs)
-        if settled is None:
-            return None
-        self.blocks.move_on(settled[1], None)
-        return settled[0]
+        if settled is not None:
+            self.blocks.move_on(settled[1], None)
+        return settled
 
     def _move_on(self, found: _Iterated, cascade: Cascade | None) -> None:
         """Choose the modes of the next iteration, and where its laws are taken. Raises ConvergenceError ("mode cycle").
@@ -369,8 +370,8 @@ class _Run:
         pairs, search, laws, memory, pressure = (
             found.outcome.pairs, self.search, self.laws, self.memory, self.load.pressure)
         rest = None if cascade else self._find_rest(found)
-        chosen, former = self._choose_modes(found, cascade, rest), self.modes
-        self.modes = self._hold_bodies(chosen, pairs, former)
+        (chosen, state), former = self._choose_modes(found, cascade, rest), self.modes
+        self.modes = self._hold_bodies(chosen, state, former)
         slip = plastic_slip(laws, pairs)
         seat = find_seat(laws, former, memory, pairs, pressure)
         self.normal_traction = choose_traction(laws, former, self.normal_traction, pairs, pressure, seat)

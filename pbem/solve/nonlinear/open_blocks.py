@@ -21,7 +21,8 @@ import numpy as np
 from pbem.arrays import Bool, Real
 from pbem.contact.laws import OPEN, ModeState, PairState
 from pbem.contact.loads import Load
-from pbem.contact.modes import P_N, P_S, Linearisation
+from pbem.contact.modes import Linearisation
+from pbem.contact.smoothed import stiffen_jumps
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.blocks import measure_drive, measure_usual
 from pbem.solve.problem.problem import Problem
@@ -85,13 +86,7 @@ class OpenBlocks:
         """The linearised laws with the stiffness in open pairs. (theory, 127)"""
         if self.state is None:
             return law
-        stiffness = self._find_stiffness(modes)
-        at = np.flatnonzero(stiffness)
-        tangent, offset = law.tangent.copy(), law.offset.copy()
-        for unknown, traction, jump in ((0, P_N, self.state.g_n), (1, P_S, self.state.g_s)):
-            tangent[at, traction, unknown] = stiffness[at]
-            offset[at, traction] -= stiffness[at] * jump[at]
-        return replace(law, tangent=tangent, offset=offset)
+        return stiffen_jumps(law, self.state, self._find_stiffness(modes))
 
     def take_off(self, modes: ModeState, state: PairState) -> tuple[PairState, Real]:
         """A state without the tractions of the stiffness, and the larger one of these at each pair (m,)."""

@@ -130,6 +130,7 @@ class Search:
         self.effort = 0.0  # what pivoting took
         self.spent = 0  # iterations that are no longer, or were never, among the counts
         self.counts: list[int] = []
+        self.clustered: list[int] = []  # those after which clusters settled by themselves
         self.changed: list[Integer] = []
         self.group: Integer = np.zeros(0, dtype=np.int64)
         self.failed_group: Integer = self.group

@@ -109,13 +109,13 @@ class Width:
 @dataclass(frozen=True)
 class SmoothCourse:
     """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, one
-    that the equations hold of, the modes that hold all bodies, and the width."""
+    that the equations hold of (None: the same), the modes that hold all bodies, and the width."""
 
     modes: ModeState
     state: PairState
-    exact: PairState
     holding: ModeState
     width: Width
+    exact: PairState | None = None
 
 
 class SmoothSearch:
@@ -151,7 +151,9 @@ class SmoothSearch:
 
     def make_cluster_search(self) -> ClusterSearch:
         """The search by clusters of the same pairs."""
-        return ClusterSearch(self._problem, self._memory, self._load, self.smooth & self._allowed, self._shape)
+        # Where they lead nowhere another search begins anew, without; of models without groups there is only one.
+        smooth = self.smooth & (self._allowed and not self._alone)
+        return ClusterSearch(self._problem, self._memory, self._load, smooth, self._shape)
 
     def begins(self, counts: Sequence[int], state: PairState) -> bool:
         """Whether laws are to be smoothed after an iteration, by the numbers of pairs that changed in those so far.
@@ -179,15 +181,14 @@ class SmoothSearch:
         solved it comes back with what was before.
         """
         problem, memory, load = self._problem, self._memory, self._load
-        clusters = tangent.find_clusters(load)
+        clusters = None if self._alone else tangent.find_clusters(load)
         if self._course is None:
             self._course = self._start(modes, clusters is None)
-        modes, state, exact = self._course.modes, self._course.state, self._course.exact
-        holding = self._course.holding
-        width = self._course.width
+        modes, state, holding = self._course.modes, self._course.state, self._course.holding
+        exact, width = self._course.exact or state, self._course.width
         proximal = PROXIMAL * problem.laws.own_stiffness
         for taken in range(self.taken, min(LONGEST, most)):
-            self._course = SmoothCourse(modes, state, exact, holding, width)
+            self._course = SmoothCourse(modes, state, holding, width, exact)
             pause()
             if not 0 < width.value < np.inf:
                 break
@@ -253,8 +254,7 @@ class SmoothSearch:
             float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
         last = (NARROWEST_ALONE if alone else NARROWEST) * largest
         begin = max(WIDTH * violation, last)
-        width = Width(begin, begin, last)
-        return SmoothCourse(modes, first, first, close_smoothed(problem.laws, modes), width)
+        return SmoothCourse(modes, first, close_smoothed(problem.laws, modes), Width(begin, begin, last))
 
     def _choose_part(self, state: PairState, found: PairState, width: Width) -> tuple[float, float]:
         """The part of the way from a state to a solution that is gone, and by how much pairs are off then."""

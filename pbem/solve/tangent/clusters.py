@@ -60,6 +60,10 @@ class Clusters:
         around = (np.unique(self._element[problem.cut.find_around(body)[0]])
                   for body in np.flatnonzero(problem.parts.block))
         self._blocks = [each for each in around if len(each) <= MOST_ELEMENTS]
+        self._blocks_of: dict[int, list[int]] = {}
+        for number, block in enumerate(self._blocks):
+            for element in block.tolist():
+                self._blocks_of.setdefault(element, []).append(number)
 
     def solve(self, chosen: Bool, columns: int, solve: SolveCluster) -> tuple[Real, Bool]:
         """See PairClusters; each rank for some of the clusters."""
@@ -103,18 +107,19 @@ class Clusters:
                         [elements[k : k + 1] for k in range(len(elements))], count)
 
     def _join(self, sets: list[Integer]) -> list[Integer]:
-        """The sets with all of the blocks that they touch, where that is not too much."""
-        count = self._problem.mesh.elements
-        inside = np.zeros(count, dtype=bool)
-        for each in sets:
-            inside[each] = True
-        touched = [block for block in self._blocks if inside[block].any()]
-        joined = _connect(sets + touched, sets + touched, count)
+        """The sets with all of the blocks that they touch, the smallest first, as many as are not too much; those that
+        then have elements in common as one, if that is not too much."""
+        wider = []
+        for own in sets:
+            touched = {number for element in own.tolist() for number in self._blocks_of.get(element, ())}
+            for number in sorted(touched, key=lambda number: (len(self._blocks[number]), number)):
+                whole = np.union1d(own, self._blocks[number])
+                own = whole if len(whole) <= MOST_ELEMENTS else own
+            wider.append(own)
         result = []
-        for each in joined:
-            within = np.zeros(count, dtype=bool)
-            within[each] = True
-            result += [each] if len(each) <= MOST_ELEMENTS else [own for own in sets if within[own].any()]
+        for numbers in _connect(wider, [np.array([k]) for k in range(len(wider))], self._problem.mesh.elements):
+            whole = np.unique(np.concatenate([wider[k] for k in numbers]))
+            result += [whole] if len(whole) <= MOST_ELEMENTS else [wider[k] for k in numbers]
         return result
 
     def _list_stiffness(self, clusters: Sequence[Cluster]) -> Iterator[tuple[Cluster, Real]]:

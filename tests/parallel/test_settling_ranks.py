@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbem.results.reader import open_results
+from pbem.results.reader import Results, open_results
 from pbem.solve.nonlinear.newton import PATIENCE
 from pbem.solve.nonlinear.search import Search
 from tests.unit.test_sweeps import grow_branches
@@ -74,6 +74,44 @@ if world.rank == 0:
 """
 
 
+# The same network without groups that settle before: clusters do, between all solutions.
+CLUSTERED = """
+import sys
+import pbem
+from pbem.parallel import world
+from pbem.solve.nonlinear.cluster_search import ClusterSearch
+from pbem.solve.nonlinear.search import Search
+from pbem.solve.preconditioner import subdomains
+
+subdomains.ONE_GROUP, subdomains.CONNECTED_ELEMENTS = 0, 16
+Search.may_sweep = lambda search: False
+settle, settled = ClusterSearch.settle, []
+
+def record(*arguments):
+    settled.append(settle(*arguments))
+    return settled[-1]
+
+ClusterSearch.settle = record
+pbem.run("network.toml", sys.argv[1])
+counts = world.gather(sum(each is not None for each in settled))
+if world.rank == 0:
+    print(*counts)
+"""
+
+
+def test_clusters_lead_to_the_same_on_all_ranks(tmp_path: Path, mpirun_snippet: Launch) -> None:
+    (tmp_path / "network.toml").write_text(grow_branches(3, 5))
+    found = []
+    for ranks in (1, 2, 3):
+        done = mpirun_snippet(ranks, CLUSTERED, f"{ranks}.h5", cwd=tmp_path)
+        counts = done.stdout.split()
+        assert done.returncode == 0 and counts == counts[:1] * ranks and int(counts[0]) > 0, done.stderr
+        found.append(open_results(tmp_path / f"{ranks}.h5"))
+    alone, *others = found
+    for results in others:
+        expect_the_same(results, alone)
+
+
 def test_smoothed_laws_lead_to_the_same_on_all_ranks(tmp_path: Path, mpirun_snippet: Launch) -> None:
     (tmp_path / "network.toml").write_text(grow_branches(3, 5))
     found = []
@@ -85,9 +123,14 @@ def test_smoothed_laws_lead_to_the_same_on_all_ranks(tmp_path: Path, mpirun_snip
     alone, *others = found
     assert alone.steps.iterations[0] > PATIENCE
     for results in others:
-        for name in ("iteration", "changed", "stick", "slip", "open"):
-            np.testing.assert_array_equal(results.convergence[name], alone.convergence[name])
-        for name, contact in alone.contact.items():
-            np.testing.assert_array_equal(results.contact[name].mode, contact.mode)
-        size = np.abs(alone.displacement).max()
-        np.testing.assert_allclose(results.displacement, alone.displacement, rtol=0, atol=1e-8 * size)
+        expect_the_same(results, alone)
+
+
+def expect_the_same(results: Results, alone: Results) -> None:
+    """The same search and statuses, and displacements."""
+    for name in ("iteration", "changed", "stick", "slip", "open"):
+        np.testing.assert_array_equal(results.convergence[name], alone.convergence[name])
+    for name, contact in alone.contact.items():
+        np.testing.assert_array_equal(results.contact[name].mode, contact.mode)
+    size = np.abs(alone.displacement).max()
+    np.testing.assert_allclose(results.displacement, alone.displacement, rtol=0, atol=1e-8 * size)

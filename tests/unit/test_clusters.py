@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -230,6 +231,33 @@ def test_searches_end_by_them_in_the_same_state(many_groups: None, monkeypatch: 
         expected = getattr(usual.contact, name)
         np.testing.assert_allclose(getattr(found.contact, name), expected, rtol=0, atol=1e-7 * np.abs(expected).max())
     assert len(found.iterations) <= 5 < 10 <= len(usual.iterations)
+
+
+def move(text: str, unit: float, shift: complex, reverse: bool) -> str:
+    """The same network in other units of length (stresses by their inverse), elsewhere, and along its curves backwards.
+    """
+    def put(match: re.Match[str]) -> str:
+        pairs = re.findall(r"\[([-\d.]+), ([-\d.]+)\]", match[0])
+        places = [unit * complex(float(x), float(y)) + shift for x, y in pairs]
+        return f"points = {[[z.real, z.imag] for z in (places[::-1] if reverse else places)]}"
+
+    text = re.sub(r"points = \[\[.*?\]\]", put, text)
+    return re.sub(r"(young|s[xy]{2}) = ([-\de.]+)", lambda match: f"{match[1]} = {float(match[2]) / unit!r}", text)
+
+
+@pytest.mark.parametrize(("unit", "shift", "reverse"),
+                         [(1e3, 0j, False), (1e-6, 0j, False), (1.0, 3e4 - 7e4j, False), (1.0, 0j, True)])
+def test_clusters_lead_to_the_same_in_other_units_elsewhere_and_backwards(
+    unit: float, shift: complex, reverse: bool, many_groups: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Search, "may_sweep", lambda search: False)
+    text = grow_branches(2, 7)
+    usual, found = march_over(text), march_over(move(text, unit, shift, reverse))
+    assert [each.changed for each in found.iterations] == [each.changed for each in usual.iterations]
+    np.testing.assert_array_equal(np.bincount(found.contact.mode), np.bincount(usual.contact.mode))
+    for name in ("slip", "opening"):
+        one, other = (np.abs(getattr(each.contact, name)).sum() for each in (found, usual))
+        assert one / unit == pytest.approx(other, rel=1e-7, abs=0)
 
 
 def test_blocks_in_a_body_lie_as_they_do_with_the_dense_operator(many_groups: None) -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 
 import pytest
 
 from tests.cases.bundled import CASES
+from tests.parallel.held_arrays import list_arrays
 from tests.parallel.launch import launch_snippet
 
 # Bytes of all arrays that a rank's problem and tangent operator hold, those of dense rows apart; from all ranks.
 MEASURE = """
+from __future__ import annotations
 import json, sys
 import numpy as np
 from petsc4py import PETSc
@@ -24,21 +27,9 @@ from pbem.contact.modes import linearise
 from pbem.solve.petsc.linear import LinearSolver
 from pbem.solve.tangent.reference import Reference
 
-def list_arrays(item, seen):
-    if id(item) in seen:
-        return
-    seen.add(id(item))
-    if isinstance(item, np.ndarray):
-        yield item
-    elif sparse.issparse(item):
-        yield from (item.data, item.indices, item.indptr)
-    elif isinstance(item, dict):
-        yield from (array for part in item.values() for array in list_arrays(part, seen))
-    elif isinstance(item, (tuple, list)):
-        yield from (array for part in item for array in list_arrays(part, seen))
-    elif hasattr(item, "__dict__"):
-        yield from list_arrays(vars(item), seen)
+"""
 
+MEASURED = """
 model = read_model(sys.argv[1])[1]
 problem = assemble_problem(model, generate_mesh(model), world)
 modes = start_memory(problem.laws).modes
@@ -60,7 +51,7 @@ if world.rank == 0:
 
 def measure(ranks: int, case: str) -> list[dict[str, float]]:
     """Per rank the bytes of its dense rows, of its part of the tangent operator, and of all other arrays."""
-    run = launch_snippet(ranks, MEASURE, CASES[case])
+    run = launch_snippet(ranks, MEASURE + inspect.getsource(list_arrays) + MEASURED, CASES[case])
     assert run.returncode == 0, run.stderr
     found: list[dict[str, float]] = json.loads(run.stdout)
     assert len(found) == ranks

@@ -36,7 +36,8 @@ BETTER, FARTHEST = 0.9, 10.0
 NEAR, NEAR_ON_WAY = 0.1, 1.0
 # The first width, as a part of the largest violation of the true laws; the next ones, as a part of the one before.
 FIRST, NEXT = 0.1, 0.1
-# The proximal stiffness, as a part of that of the surroundings of each pair alone (theory, 127).
+# The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
+# where tangents cancel these, and so little that blocks hardly feel it (theory, 127).
 PROXIMAL = 1e-5
 
 # The modes that states of the pairs in some modes ask for.

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.arrays import Integer, Real
+from pbem.contact.cluster_laws import FARTHEST, PROXIMAL
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
@@ -58,7 +59,7 @@ WIDTH, NARROWEST, NARROWEST_ALONE = 0.1, 1e-8, 1e-6
 # leaves them there, or to AIM_FAR where clusters settle by themselves, if pairs were off by no more than CALM before
 # that. Else an iteration with the same width brings them nearer.
 AIM, AIM_AGAIN, AIM_FAR = 0.1, 0.01, 1e-3
-CENTRED, CALM, FARTHEST = 0.15, 0.1, 10.0
+CENTRED, CALM = 0.15, 0.1
 # Of the way to a solution the largest of these parts is gone that leaves pairs off by no more than NEAR; with the same
 # width, the whole if it leaves BETTER of what they were off, else the part that leaves least.
 PARTS = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05)
@@ -68,9 +69,6 @@ NEAR, BETTER = 0.3, 0.9
 OFF, MOST_OFF = 1.0, 0.3
 # Pairs that are shorter than the mean have larger widths, by the root of how much shorter they are, up to so much.
 MOST_WIDENED = 1e3
-# The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
-# where tangents cancel these, and so little that blocks hardly feel it.
-PROXIMAL = 1e-5
 # It ends after so many iterations, or one with the last width in which no more than this part of all pairs, or so many,
 # change: with the true laws the few blocks that are left settle sooner.
 LONGEST, FEW, FEWEST = 40, 1e-2, 10

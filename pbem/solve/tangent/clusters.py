@@ -4,8 +4,7 @@ Where all but a few pairs of a network are near to their laws, those few, around
 keep all others waiting: each solution of the whole moves them a little, or too far. Solved for by themselves they are
 as near as the others at the next one (non-linear elimination: P. J. Lanzkron, D. J. Rose, J. T. Wilkes, SIAM J. Sci.
 Comput. 17, 1996; X.-C. Cai, X. Li, SIAM J. Sci. Comput. 33, 2011). Unlike the groups that settle before every solution
-(pbem.solve.tangent.sweeps), clusters form where such pairs are, with all of a small block and some of the surroundings.
-
+(pbem.solve.tangent.sweeps), clusters form where such pairs are, with small blocks whole and some of the surroundings.
 """
 
 from __future__ import annotations

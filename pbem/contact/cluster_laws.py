@@ -37,8 +37,9 @@ NEAR, NEAR_ON_WAY = 0.1, 1.0
 # The first width, as a part of the largest violation of the true laws; the next ones, as a part of the one before.
 FIRST, NEXT = 0.1, 0.1
 # The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
-# where tangents cancel these, and so little that blocks hardly feel it (theory, 127).
-PROXIMAL = 1e-5
+# where tangents cancel these, and so little that blocks hardly feel it (theory, 127). In clusters, whose systems are
+# small and solved in double precision, blocks that hardly anything drives come to rest with less.
+PROXIMAL, PROXIMAL_ALONE = 1e-5, 1e-8
 
 # The modes that states of the pairs in some modes ask for.
 Judge = Callable[[ModeState, PairState], Proposal]
@@ -95,7 +96,7 @@ class ClusterContact:
     def narrow(self, state: PairState, shape: Real, last: float) -> PairState | None:
         """The state near to the smoothed laws of the width `last` > 0, by way of larger ones, each times shape (k,);
         None if there is none, or it is too far."""
-        contact, proximal = self, PROXIMAL * self.subset.laws.own_stiffness
+        contact, proximal = self, PROXIMAL_ALONE * self.subset.laws.own_stiffness
         width = max(FIRST * float(self._find_violation(state, 0.0).max(initial=0.0)), last)
         for _ in range(MOST_WIDTHS):
             found = contact._approach(state, width * shape, proximal, NEAR_ON_WAY)
@@ -115,7 +116,7 @@ class ClusterContact:
         modes, exact = read_modes(laws, self.smooth, state, memory, pressure), self.exact
         for _ in range(MOST_AT_END):
             law = linearise(laws, modes, state.p_n, plastic_slip(laws, state), memory, pressure, self.scale)
-            stiffness = np.where(modes.mode == OPEN, PROXIMAL * laws.own_stiffness, 0.0)
+            stiffness = np.where(modes.mode == OPEN, PROXIMAL_ALONE * laws.own_stiffness, 0.0)
             found = self._solve(stiffen_jumps(law, state, stiffness), exact)
             if found is None:
                 return None

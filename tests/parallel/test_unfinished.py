@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -15,9 +16,16 @@ import pbem
 from pbem.cli import main
 from pbem.errors import StopError
 from pbem.results.reader import Results, open_results
+from pbem.solve.nonlinear import smooth_search
+from pbem.solve.nonlinear.cluster_search import ClusterSearch
+from pbem.solve.nonlinear.search import Search
 from pbem.solve.problem.step import Iteration, SilentReporter
 from tests.parallel.launch import launch_snippet
+from tests.unit.test_smoothed import at_once
+from tests.unit.test_sweeps import grow_branches, many_groups
 from tests.verification.test_settling import WEAKENING_INCLUSIONS
+
+__all__ = ["at_once", "many_groups"]  # fixtures
 
 # Cracks in one load step: their statuses take a number of iterations.
 MAKE = ("make", "cracks", "-o", "case.toml", "--count", "40", "--density", "0.15", "--orientation", "30",
@@ -107,6 +115,25 @@ def test_pairs_that_run_on_know_what_they_were(tmp_path: Path) -> None:
     """Friction that weakens: groups that ran on grow by those that changed before the run was stopped."""
     (tmp_path / "case.toml").write_text(WEAKENING_INCLUSIONS)
     expect_no_iteration_twice(tmp_path, "dense")
+
+
+def test_clusters_settle_after_a_run_is_resumed_too(
+    many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A network whose laws are smoothed for too short, and whose clusters settle by themselves after that."""
+    monkeypatch.setattr(smooth_search, "LONGEST", 2)
+    (tmp_path / "case.toml").write_text(grow_branches(0, 6))
+    asked = []
+
+    def ask(clusters: ClusterSearch, search: Search, _suits: Any = ClusterSearch.suits) -> bool:
+        asked.append(_suits(clusters, search))
+        return asked[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ClusterSearch, "suits", ask)
+        pbem.run(tmp_path / "case.toml", tmp_path / "once.h5", operator="hierarchical")
+    assert any(asked)
+    expect_no_iteration_twice(tmp_path, "hierarchical")
 
 
 def expect_no_iteration_twice(folder: Path, operator: str) -> None:

@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, ModeState, PairState
-from pbem.contact.modes import linearise
+from pbem.contact.modes import Linearisation, linearise
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import open_blocks
-from pbem.solve.nonlinear.open_blocks import FALL, FLOATING, OWN, PART, OpenBlocks
+from pbem.solve.nonlinear.open_blocks import ANCHORED, DRIVEN, ELSEWHERE, FALL, FLOATING, OWN, OpenBlocks
 from pbem.solve.nonlinear.smooth_search import SmoothSearch
 from pbem.solve.problem.step import SilentReporter, Step
 from pbem.solve.steps.march import march
@@ -27,79 +27,131 @@ __all__ = ["many_groups"]
 COUNT, SCALE = 12, 7.0
 UNSOLVED = ConvergenceError("linear solver", "GMRES did not end")
 
-
 WEIGHT = np.linspace(0.1, 1.0, COUNT)
+AROUND = {1: np.arange(4, 9), 2: np.arange(8, COUNT)}
+# What of the stiffness of the surroundings acts where nothing can move, by the mean length of the pairs of a curve.
+OWN_STIFFNESS = np.repeat(3.0 / WEIGHT.reshape(2, -1).mean(axis=1), COUNT // 2)
+HELD = (np.arange(COUNT) % 2 == 0) & (np.arange(COUNT) > 0)
 
 
-def make_blocks() -> tuple[Any, OpenBlocks, ModeState, PairState]:
+def make_blocks(moving: tuple[int, ...] = ()) -> tuple[Any, OpenBlocks, ModeState, PairState]:
     """Laws of pairs on two curves, of which all but the first pair are smoothed, stiffer where pairs are shorter; modes
-    of which every other pair is open; a state."""
+    of which every other pair is open; a state. moving: the bodies that can move, 1 and 2 are blocks between some of the
+    pairs, see AROUND."""
     laws = make_laws(COUNT, np.full(COUNT, 0.6), own_stiffness=3.0 / WEIGHT)
     modes = ModeState(np.where(np.arange(COUNT) % 2, SLIP, OPEN).astype(np.int8), np.ones(COUNT))
     state = PairState(*np.random.default_rng(4).normal(size=(4, COUNT)))
     pairs = SimpleNamespace(interface=np.arange(COUNT) // (COUNT // 2), weight=WEIGHT)
-    problem: Any = SimpleNamespace(laws=laws, mesh=SimpleNamespace(pairs=pairs), traction_scale=SCALE)
+    problem: Any = SimpleNamespace(
+        laws=laws, mesh=SimpleNamespace(pairs=pairs), traction_scale=SCALE, decide=lambda choose: choose(),
+        find_cut_motions=lambda modes: (SimpleNamespace(moving=moving),),
+        parts=SimpleNamespace(block=np.array([False, True, True])),
+        cut=SimpleNamespace(find_around=lambda body: (AROUND[body], None)))
     return laws, OpenBlocks(problem, np.arange(COUNT) > 0), modes, state
 
 
-def test_open_pairs_bear_what_their_jumps_change() -> None:
-    laws, blocks, modes, state = make_blocks()
-    pressure = np.full(COUNT, 0.2)
-    law = linearise(laws, modes, np.full(COUNT, -1.0), np.zeros(COUNT), remember(0.0, COUNT), pressure, SCALE)
+def linearise_laws(laws: Any, modes: ModeState) -> Linearisation:
+    bound, rest = np.full(COUNT, -1.0), np.zeros(COUNT)
+    return linearise(laws, modes, bound, rest, remember(0.0, COUNT), np.full(COUNT, 0.2), SCALE)
+
+
+@pytest.mark.parametrize(("moving", "driven", "anchored"), [
+    ((), (), ()), ((1,), (), (1,)), ((0, 1, 2), (2,), (1,)), ((1,), (1,), ())])
+def test_open_pairs_bear_what_their_jumps_change(
+    moving: tuple[int, ...], driven: tuple[int, ...], anchored: tuple[int, ...]
+) -> None:
+    laws, blocks, modes, state = make_blocks(moving)
+    law = linearise_laws(laws, modes)
     assert blocks.stiffen(law, modes) is law
     unknowns = np.random.default_rng(5).normal(size=(COUNT, 2))
     usual = law.evaluate(unknowns)
-    left, borne = blocks.take_off(modes, usual)
+    left, borne = blocks.take_off(usual)
     assert left is usual and not borne.any()
     blocks.begin(state)
+    blocks.driven = frozenset(driven)
     found = blocks.stiffen(law, modes).evaluate(unknowns)
-    held = (modes.mode == OPEN) & (np.arange(COUNT) > 0)
-    # All pairs of a curve alike: 3 by the mean of their lengths.
-    mean = np.repeat(WEIGHT.reshape(2, -1).mean(axis=1), COUNT // 2)
-    stiffness = np.where(held, PART * 3.0 / mean, 0.0)
-    np.testing.assert_allclose(found.p_n - usual.p_n, stiffness * (usual.g_n - state.g_n), rtol=1e-6, atol=1e-15)
-    np.testing.assert_allclose(found.p_s - usual.p_s, stiffness * (usual.g_s - state.g_s), rtol=1e-6, atol=1e-15)
-    left, borne = blocks.take_off(modes, found)
+    part = np.full(COUNT, ELSEWHERE)
+    for body in driven:
+        part[AROUND[body]] = DRIVEN
+    for body in anchored:  # also where a driven block is beside it
+        part[AROUND[body]] = ANCHORED
+    stiffness = np.where(HELD, part * OWN_STIFFNESS, 0.0)
+    near = {"rtol": 1e-6, "atol": 1e-14}
+    np.testing.assert_allclose(found.p_n - usual.p_n, stiffness * (usual.g_n - state.g_n), **near)
+    np.testing.assert_allclose(found.p_s - usual.p_s, stiffness * (usual.g_s - state.g_s), **near)
+    left, borne = blocks.take_off(found)
     np.testing.assert_allclose(left.p_n, usual.p_n, rtol=0, atol=1e-14)
     np.testing.assert_allclose(left.p_s, usual.p_s, rtol=0, atol=1e-14)
     by = np.maximum(np.abs(found.p_n - usual.p_n), np.abs(found.p_s - usual.p_s))
-    np.testing.assert_allclose(borne, by, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(borne, by, **near)
 
 
-def test_the_stiffness_falls_once_no_mode_changes_but_around_blocks_that_float() -> None:
-    _, blocks, modes, state = make_blocks()
-    floats = np.arange(COUNT) >= 8
-    blocks.move_on(state, floats)
+def find_parts(blocks: OpenBlocks, laws: Any, modes: ModeState) -> Real:
+    """The parts of the stiffness of the surroundings that act on the pairs that have any."""
+    base = PairState(*np.zeros((4, COUNT)))
+    before, blocks.state = blocks.state, base
+    blocks.stiffen(linearise_laws(laws, modes), modes)
+    _, borne = blocks.take_off(PairState(*np.zeros((2, COUNT)), np.ones(COUNT), np.zeros(COUNT)))
+    blocks.state = before
+    assert not borne[~HELD].any()
+    return np.asarray((borne / OWN_STIFFNESS)[HELD])
+
+
+def test_the_stiffness_falls_once_no_mode_changes_but_around_anchored_blocks() -> None:
+    laws, blocks, modes, state = make_blocks((1, 2))
+    blocks.move_on(state, frozenset(), True)
     assert blocks.state is None and not blocks.stiffen_again(UNSOLVED)
     blocks.begin(state)
-    moved = PairState(state.p_n, state.p_s, state.g_n + 1.0, state.g_s)
-    held = (modes.mode == OPEN) & (np.arange(COUNT) > 0)
-    before = blocks.take_off(modes, moved)[1]
-    np.testing.assert_array_equal(before > 0, held)
+    blocks.driven = frozenset({2})
+    around = [np.isin(np.flatnonzero(HELD), AROUND[body]) for body in (1, 2)]
 
-    def check(part: float) -> None:
-        borne = blocks.take_off(modes, moved)[1]
-        np.testing.assert_allclose(borne, np.where(floats, 1.0, part) * before, rtol=1e-12)
+    def check(driven: float, elsewhere: float) -> None:
+        expected = np.where(around[0], ANCHORED, np.where(around[1], driven, elsewhere))
+        np.testing.assert_allclose(find_parts(blocks, laws, modes), expected, rtol=1e-12)
 
-    blocks.move_on(state, None)
-    np.testing.assert_array_equal(blocks.take_off(modes, moved)[1], before)
-    blocks.move_on(state, floats)
-    check(FALL)
-    blocks.move_on(state, floats)
-    check(FALL**2)
-    # A system that could not be solved: what was before comes back, and is the least.
+    check(DRIVEN, ELSEWHERE)
+    blocks.move_on(state, frozenset(), False)
+    check(DRIVEN, ELSEWHERE)
+    blocks.move_on(state, frozenset({2}), True)
+    check(FALL * DRIVEN, FALL * ELSEWHERE)
+    # A system that could not be solved: there is more of it, up to what is around driven blocks, and that is the least.
     assert not blocks.stiffen_again(ConvergenceError("accuracy", "of something else"))
-    check(FALL**2)
+    check(FALL * DRIVEN, FALL * ELSEWHERE)
     assert blocks.stiffen_again(UNSOLVED)
-    check(FALL)
-    blocks.move_on(state, floats)
-    check(FALL)
+    check(DRIVEN, ELSEWHERE)
+    blocks.move_on(state, frozenset({2}), True)
+    check(DRIVEN, ELSEWHERE)
     assert blocks.stiffen_again(ConvergenceError("singular tangent", "of a block"))
+    check(DRIVEN, ELSEWHERE / FALL)
+    assert blocks.stiffen_again(UNSOLVED)
     assert not blocks.stiffen_again(UNSOLVED)
-    check(1.0)
+    check(DRIVEN, DRIVEN)
+    # Nothing that was driven once is anchored again before the modes have settled.
+    blocks.move_on(state, frozenset({1}), False)
+    assert blocks.driven == {1, 2}
+    blocks.move_on(state, frozenset({1}), True)
+    assert blocks.driven == {1}
+
+
+def test_anchored_blocks_stay_where_they_were_and_all_else_moves_on() -> None:
+    laws, blocks, modes, state = make_blocks((1, 2))
     blocks.begin(state)
-    blocks.move_on(moved, None)
-    assert not blocks.take_off(modes, moved)[1].any()
+    blocks.driven = frozenset({2})
+    law = linearise_laws(laws, modes)
+    blocks.stiffen(law, modes)
+    moved = PairState(*(values + 1.0 for values in vars(state).values()))
+    blocks.move_on(moved, frozenset({2}), False)
+    assert blocks.state is not None
+    stays = np.isin(np.arange(COUNT), AROUND[1])
+    np.testing.assert_array_equal(blocks.state.g_n, np.where(stays, state.g_n, moved.g_n))
+    # But where clusters lay them they are anchored anew.
+    blocks.settle(moved)
+    np.testing.assert_array_equal(blocks.state.g_n, moved.g_n)
+    # Found to be driven, it moves on from the next iteration.
+    blocks.move_on(state, frozenset({1}), False)
+    blocks.stiffen(law, modes)
+    blocks.move_on(state, frozenset({1}), False)
+    np.testing.assert_array_equal(blocks.state.g_n, state.g_n)
 
 
 @pytest.mark.parametrize(("drive", "weight", "block", "counts"), [
@@ -109,22 +161,21 @@ def test_what_is_left_over_on_blocks_that_float_does_not_count(
     drive: float, weight: float, block: bool, counts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """weight: of the block itself, to what is left over by a mesh (see measure_drive)."""
-    _, blocks, modes, state = make_blocks()
-    problem: Any = blocks._problem
-    own, other = np.arange(4, COUNT), np.arange(4)
-    problem.parts = SimpleNamespace(block=np.array([False, block]))
-    problem.find_cut_motions = lambda modes: (SimpleNamespace(moving=(1,)),)
-    problem.cut = SimpleNamespace(find_around=lambda body: (own, None))
+    laws, blocks, modes, state = make_blocks((1,) if block else (0,))
+    own, other = AROUND[1], np.setdiff1d(np.arange(COUNT), AROUND[1])
+    blocks.begin(state)
+    blocks.stiffen(linearise_laws(laws, modes), modes)
     usual = np.average(np.maximum(np.hypot(state.p_n, state.p_s), SCALE * np.hypot(state.g_n, state.g_s)),
                        weights=WEIGHT)
     size = max(np.abs(state.p_n).max(), np.abs(state.p_s).max())
     borne = np.zeros(COUNT)
+    load: Any = None  # measure_drive alone would need it
     borne[own], borne[other] = drive * FLOATING * usual, 1e-7 * size
     monkeypatch.setattr(open_blocks, "measure_drive", lambda *_: weight * OWN * drive * FLOATING * usual)
-    rest, floats = blocks.measure_rest(modes, state, borne, problem)
+    rest, driven = blocks.measure_rest(state, borne, load)
     np.testing.assert_allclose(rest, borne[own[0]] / size if counts else 1e-7, rtol=1e-12)
-    np.testing.assert_array_equal(floats, (np.arange(COUNT) >= 4) & (not counts))
-    assert blocks.measure_rest(modes, state, np.zeros(COUNT), problem)[0] == 0.0
+    assert driven == ({1} if block and counts else set())
+    assert blocks.measure_rest(state, np.zeros(COUNT), load) == (0.0, frozenset())
 
 
 def write_blocks(load: str) -> str:
@@ -176,13 +227,13 @@ def test_what_is_tried_again_with_more_stiffness_is_told(many_groups: None, monk
             told.append(text)
 
     def fail_once(tangent: KrylovTangent, *given: Any, **named: Any) -> Any:
-        if begun and begun[-1].part < PART:
+        if begun and begun[-1].fallen < 1:
             raise UNSOLVED
         return solve_system(tangent, *given, **named)
 
     def begin(blocks: OpenBlocks, state: PairState, _begin: Any = OpenBlocks.begin) -> None:
         _begin(blocks, state)
-        blocks.part = FALL * PART
+        blocks.fallen = FALL
         begun.append(blocks)
 
     monkeypatch.setattr(KrylovTangent, "solve", fail_once)

@@ -32,6 +32,7 @@ Plain = Mapping[str, Any]
 KINDS = {kind.__name__: kind for kind in (ModeState, PairState, Linearisation, Settled, SmoothCourse, Width,
                                           Iteration)}
 KIND = "kind"
+COLLECTIONS = {each.__name__: each for each in (tuple, set, frozenset)}
 # Attributes of the parts of a search that they are made with, or that count within an iteration only.
 GIVEN = {
     "forcing": (),
@@ -41,7 +42,7 @@ GIVEN = {
                "proposal"),
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
     "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape", "_along", "_alone"),
-    "blocks": ("_problem", "_smooth", "_own"),
+    "blocks": ("_problem", "_smooth", "_own", "_stiffness"),
 }
 
 
@@ -127,7 +128,7 @@ def to_plain(value: Any) -> Any:
         return value
     if isinstance(value, Mapping):
         return {str(key): to_plain(each) for key, each in value.items()}
-    if isinstance(value, tuple | set):
+    if isinstance(value, tuple | set | frozenset):
         return {KIND: type(value).__name__, "of": [to_plain(each) for each in value]}
     if isinstance(value, Sequence):
         return [to_plain(each) for each in value]
@@ -144,7 +145,7 @@ def from_plain(value: Any) -> Any:
     kind = value.get(KIND)
     if kind is None:
         return named
-    return {"tuple": tuple, "set": set}[kind](named["of"]) if kind in ("tuple", "set") else KINDS[kind](**named)
+    return COLLECTIONS[kind](named["of"]) if kind in COLLECTIONS else KINDS[kind](**named)
 
 
 def describe_error(error: ConvergenceError) -> Plain:

@@ -26,8 +26,8 @@ STRAIN_FLOOR = 0.1
 class Outcome:
     """What a solution says of the modes that led to it; settled: none changes, and the laws of slipping pairs hold.
 
-    floats (m,): pairs around blocks that float, once settled; rests: whether the stiffness of open blocks bears no more
-    than the tolerance but there.
+    driven: blocks that the stiffness of open blocks resists though nothing holds them; rests: whether it bears no more
+    than the tolerance elsewhere, but around blocks that float.
     """
 
     pairs: PairState
@@ -35,7 +35,7 @@ class Outcome:
     settled: bool
     failing: Bool
     law_error: float
-    floats: Bool | None
+    driven: frozenset[int]
     rests: bool
 
 
@@ -47,7 +47,7 @@ def judge_solution(
     problem, laws = hold.problem, hold.problem.laws
 
     def judge() -> Outcome:
-        pairs, borne = blocks.take_off(modes, evaluate_pairs(problem.mesh, law, solved.unknowns))
+        pairs, borne = blocks.take_off(evaluate_pairs(problem.mesh, law, solved.unknowns))
         floor = find_floor(problem, solved)
         proposal = make_judge(problem, solved, globalisation)(laws, modes, pairs, memory, load.pressure)
         proposal = hold.excuse(modes, pairs, proposal, load.pressure)
@@ -55,8 +55,8 @@ def judge_solution(
         failing = find_failures(laws, pairs, memory, load.pressure, floor)
         tolerance = problem.model.solver.newton_tolerance
         settled = not proposal.changed.any() and law_error <= tolerance
-        off, floats = blocks.measure_rest(modes, pairs, borne, load) if settled else (np.inf, None)
-        return Outcome(pairs, proposal, settled, failing, law_error, floats, off <= tolerance)
+        off, driven = blocks.measure_rest(pairs, borne, load)
+        return Outcome(pairs, proposal, settled, failing, law_error, driven, off <= tolerance)
 
     return problem.decide(judge)
 

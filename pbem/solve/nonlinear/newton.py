@@ -305,7 +305,7 @@ class _Run:
         search, outcome = self.search, found.outcome
         self.frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
         search.note(outcome.proposal, outcome.law_error)
-        self.blocks.move_on(outcome.pairs, outcome.floats)
+        self.blocks.move_on(outcome.pairs, outcome.driven, outcome.settled)
         self.running.note(search, outcome.proposal, outcome.law_error)
         if end := search.find_end(self.most, self.hurried):
             raise end_search(self.hold, end, self.modes, outcome.proposal, search)
@@ -361,7 +361,7 @@ class _Run:
         settled = self.clusters.settle(
             self.tangent, self.search, self.modes, found.law, found.solved, found.outcome.pairs)
         if settled is not None:
-            self.blocks.move_on(settled[1], None)
+            self.blocks.settle(settled[1])
         return settled
 
     def _move_on(self, found: _Iterated, cascade: Cascade | None) -> None:

@@ -129,7 +129,8 @@ class SmoothSearch:
         self._problem, self._memory, self._load = problem, memory, load
         self.smooth = find_smooth(laws, memory, load.pressure) if allowed else np.zeros(laws.count, dtype=bool)
         self._alone = alone
-        self._allowed = bool((self.smooth | laws.bonded | laws.parted | laws.follows).all() and self.smooth.any())
+        self._able = bool((self.smooth | laws.bonded | laws.parted | laws.follows).all() and self.smooth.any())
+        self._allowed = self._able  # once it has begun no longer
         self._first: PairState | None = None
         self.taken = 0  # iterations so far
         self.begun = False  # whether `find` is to be asked, or has not ended yet
@@ -142,7 +143,7 @@ class SmoothSearch:
         """By what the width of each pair (m,) is multiplied: short ones have the others' product of force and opening
         (theory, 122)."""
         weight = self._problem.mesh.pairs.weight
-        if not self._allowed:
+        if not self._able:
             return np.ones(len(weight))
         mean = float(weight[self.smooth].mean())
         return np.asarray(np.sqrt(mean / np.clip(weight, mean / MOST_WIDENED**2, mean)))
@@ -150,7 +151,7 @@ class SmoothSearch:
     def make_cluster_search(self) -> ClusterSearch:
         """The search by clusters of the same pairs."""
         # Where they lead nowhere another search begins anew, without; of models without groups there is only one.
-        smooth = self.smooth & (self._allowed and not self._alone)
+        smooth = self.smooth & (self._able and not self._alone)
         return ClusterSearch(self._problem, self._memory, self._load, smooth, self._shape)
 
     def begins(self, counts: Sequence[int], state: PairState) -> bool:

@@ -41,7 +41,7 @@ GIVEN = {
     "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "most_futile", "most_effort",
                "proposal"),
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
-    "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape", "_along", "_alone"),
+    "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape", "_along", "_alone", "_able"),
     "blocks": ("_problem", "_smooth", "_own", "_stiffness"),
 }
 

@@ -11,6 +11,7 @@ from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
 from pbem.results.facts import count_outer_curves
 from pbem.results.linearity import describe_linearity
+from pbem.results.pushed_faces import find_pushed_faces
 from pbem.results.reader import Results
 from pbem.results.rigid import COMPONENTS, list_rigid_rows
 from pbem.results.text_tables import format_number as _number
@@ -20,6 +21,7 @@ from pbem.results.text_tables import table as _table
 from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.results.trace_names import name_trace
 from pbem.results.traces import list_traces
+from pbem.solve.steps.open_faces import describe_pushed
 from pbem.wording import count as _count
 from pbem.wording import write_percent
 
@@ -62,6 +64,7 @@ def describe_results(results: Results, traces: int = 10) -> str:
         parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
         parts.append(_section("beyond linear theory at the last step", describe_linearity(results.linearity)))
+        parts.append(_section("faces in each other at the last step", describe_pushed(find_pushed_faces(results))))
         parts.append(_section("estimated discretisation errors", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],

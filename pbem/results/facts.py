@@ -11,10 +11,12 @@ import numpy as np
 
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.results.configuration import to_plain
+from pbem.results.pushed_faces import find_pushed_faces
 from pbem.results.reader import Results
 from pbem.results.rigid import COMPONENTS
 from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.results.traces import list_traces
+from pbem.solve.steps.open_faces import describe_pushed
 
 
 def count_outer_curves(results: Results) -> int:
@@ -71,7 +73,8 @@ def _collect_last(results: Results, traces: int | None) -> dict[str, Any]:
         "linearity": _collect_linearity(results),
         "errors": {"missing": results.errors.missing,
                    "relative": {kind: np.max(values) for kind, values in results.errors.relative.items()}},
-        "notes": [*compare_release(results), *explain_missing_factors(results)],
+        "notes": [*compare_release(results), *explain_missing_factors(results),
+                  *(f"{text[0].upper()}{text[1:]}." for text in describe_pushed(find_pushed_faces(results)))],
     }
 
 

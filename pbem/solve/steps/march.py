@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -35,7 +35,7 @@ from pbem.solve.steps.ends import (
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.steps.softly import solve_softly
-from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing
+from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing, note_pushed
 from pbem.solve.steps.values import refuse_without_value
 
 # After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
@@ -107,7 +107,9 @@ def march(
     """
     begin = start or start_from_rest(problem)
     arranged, whole = Arranged(problem, kept), problem
-    number, memory, contact, noted, told, depth = begin.number, begin.memory, begin.contact, 0.0, 0.0, 0.0
+    number, memory, contact = begin.number, begin.memory, begin.contact
+    noted, told, depth = 0.0, 0.0, 0.0
+    pushed: Mapping[str, float] = {}
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
@@ -133,6 +135,7 @@ def march(
                 noted = note_imbalance(problem, step, noted, reporter)
                 told = note_nonlinearity(problem, step, told, reporter)
                 depth = note_passing(problem, step, depth, reporter)
+                pushed = note_pushed(problem, step, pushed, reporter)
                 contact = step.contact
                 with note_place(step, solution.modes):
                     reporter.accept(step)

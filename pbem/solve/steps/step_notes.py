@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.nonlinear.imbalance import describe_imbalance
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Reporter, Step
 from pbem.solve.steps.linearity import describe_nonlinearity, measure_excess
+from pbem.solve.steps.open_faces import PushedFaces, describe_pushed, find_pushed
 from pbem.solve.steps.passing import describe_passing, find_passing
 
 
@@ -51,3 +56,22 @@ def note_passing(problem: Problem, step: Step, noted: float, reporter: Reporter)
         return noted
     reporter.note(f"Step {step.number}: {describe_passing(found)}.")
     return found.depth
+
+
+def note_pushed(problem: Problem, step: Step, noted: Mapping[str, float], reporter: Reporter) -> Mapping[str, float]:
+    """Note curves whose faces are open and pushed into each other, if twice as deep as was noted of them before;
+    returns the depths by curve that are noted now."""
+    pairs, names = problem.mesh.pairs, problem.mesh.interface_names
+
+    def find() -> list[PushedFaces]:
+        place, by_law = pairs.position + problem.model.origin, np.ones(len(names), dtype=bool)
+        if problem.arrangement is not None:
+            by_law[pairs.interface[problem.arrangement.opened]] = False
+        return find_pushed(names, by_law, pairs.interface, np.stack([place.real, place.imag], axis=1),
+                           problem.laws.parted, step.contact.opening, step.contact.slip)
+
+    found = do_on_first(problem.comm, ConvergenceError, find)
+    new = [each for each in found if each.depth > 2 * noted.get(each.name, 0.0)]
+    for text in describe_pushed(new):
+        reporter.note(f"Step {step.number}: {text}.")
+    return {**noted, **{each.name: each.depth for each in new}}

@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 
 from pbem.geometry.shape import LARGEST
-from pbem.importing.reading import Reading, Trace, draw_line, fail
+from pbem.importing.reading import Reading, Trace, choose_names, draw_line, fail
 from pbem.wording import list_names, show
 
 DELIMITERS = ",;\t|"
@@ -135,11 +135,9 @@ def _read_segments(rows: list[tuple[int, list[str]]], columns: dict[str, int], r
         if None not in (x1, y1, x2, y2):
             assert x1 is not None and y1 is not None and x2 is not None and y2 is not None
             found.append((line, name, complex(x1, y1), complex(x2, y2)))
-    names = [name for _, name, _, _ in found]
-    told = all(name and name.isprintable() for name in names) and len(set(names)) == len(names)
-    for number, (line, name, start, end) in enumerate(found, 1):
-        own = name if told and name else f"t{number}"
-        reading.traces.append(Trace(own, f"line {line}", (draw_line([start, end]),)))
+    names = choose_names({"id": [name for _, name, _, _ in found]}, len(found), reading)
+    for name, (line, _, start, end) in zip(names, found, strict=True):
+        reading.traces.append(Trace(name, f"line {line}", (draw_line([start, end]),)))
 
 
 def _read_vertices(rows: list[tuple[int, list[str]]], columns: dict[str, int], reading: Reading) -> None:

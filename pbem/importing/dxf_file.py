@@ -15,6 +15,7 @@ from typing import Any
 from pbem.errors import PbemError
 from pbem.geometry.curve import Leg
 from pbem.importing.reading import Reading, Trace, fail
+from pbem.wording import show
 
 Tags = list[tuple[str, str]]
 
@@ -34,12 +35,16 @@ def read_dxf(path: Path) -> Reading:
     reading = Reading()
     drawing = _open(path, reading)
     others: Counter[str] = Counter()
+    hidden: Counter[str] = Counter()
     heights = False
     numbers: Counter[str] = Counter()
     for entity in drawing.modelspace():
         kind = entity.dxftype()
         numbers[kind] += 1
         place = f"{kind} {numbers[kind]}"
+        if reason := _find_hidden(entity, drawing):
+            hidden[f"{kind} {reason}"] += 1
+            continue
         if kind not in KINDS:
             others[kind] += 1
             continue
@@ -59,11 +64,24 @@ def read_dxf(path: Path) -> Reading:
             reading.traces.append(Trace(f"t{len(reading.traces) + 1}", place, (tuple(legs),)))
     if heights:
         reading.notes.append("Heights of points are ignored: the model is plane.")
+    for what, count in sorted(hidden.items()):
+        reading.left_out.append(f"{count} {what}: what the drawing does not show is not read")
     for kind, count in sorted(others.items()):
         reading.left_out.append(f"{count} {kind}: only {', '.join(KINDS)} are read")
     if reading.faults:
         raise fail(path, reading.faults)
     return reading
+
+
+def _find_hidden(entity: Any, drawing: Any) -> str:
+    """Why an entity is not seen in the drawing; empty if it is."""
+    name = entity.dxf.get("layer", "0")
+    layer = drawing.layers.get(name) if drawing.layers.has_entry(name) else None
+    if layer is not None and layer.is_frozen():
+        return f"on layer {show(name)}, which is frozen"
+    if layer is not None and layer.is_off():
+        return f"on layer {show(name)}, which is turned off"
+    return "that is set invisible" if entity.dxf.get("invisible", 0) else ""
 
 
 def _open(path: Path, reading: Reading) -> Any:

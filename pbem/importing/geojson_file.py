@@ -13,6 +13,8 @@ from pbem.wording import show
 
 # Properties that may name the traces, in this order, in small letters.
 NAMES = ("name", "id", "fid", "objectid", "trace_id", "label")
+# The identifier that a feature has beside its properties; after the first two of these.
+OF_FEATURES = "id of the features"
 # EPSG codes in this range are systems of geographic coordinates.
 GEOGRAPHIC = range(4001, 5000)
 
@@ -31,7 +33,7 @@ def read_geojson(path: Path, text: str) -> Reading:
     lines = [(place, feature, parts) for place, feature in features if (parts := _read_lines(feature, place, reading))]
     if reading.faults:
         raise fail(path, reading.faults)
-    names = choose_names(_list_names([feature for _, feature, _ in lines]), len(lines))
+    names = choose_names(_list_names([feature for _, feature, _ in lines]), len(lines), reading)
     reading.traces = [
         Trace(name, place, tuple(parts)) for name, (place, _, parts) in zip(names, lines, strict=True)
     ]
@@ -118,17 +120,18 @@ def _read_points(row: Any, place: str, reading: Reading) -> list[complex] | None
     return points if len(reading.faults) == before else None
 
 
-def _list_names(features: list[Mapping[str, Any]]) -> list[list[str | None]]:
-    """Candidates for the names of all features."""
-    candidates = [[_spell(feature.get("id")) for feature in features]]
+def _list_names(features: list[Mapping[str, Any]]) -> dict[str, list[str | None]]:
+    """Candidates for the names of all features, by where they stand."""
     tables = []
     for feature in features:
         properties = feature.get("properties")
         tables.append(
             {str(key).lower(): value for key, value in properties.items()} if isinstance(properties, dict) else {}
         )
-    by_property = [[_spell(table.get(key)) for table in tables] for key in NAMES]
-    return [*by_property[:2], *candidates, *by_property[2:]]
+    by_property = {key: [_spell(table.get(key)) for table in tables] for key in NAMES}
+    of_features = {OF_FEATURES: [_spell(feature.get("id")) for feature in features]}
+    first = {key: by_property.pop(key) for key in NAMES[:2]}
+    return {**first, **of_features, **by_property}
 
 
 def _spell(value: Any) -> str | None:

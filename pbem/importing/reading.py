@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -87,13 +88,35 @@ def draw_line(points: Sequence[complex]) -> tuple[Leg, ...]:
     return tuple(Leg(a, b, 1) for a, b in pairwise(points))
 
 
-def choose_names(candidates: Sequence[Sequence[str | None]], count: int) -> list[str]:
-    """Names of so many traces: the first list of candidates that has a different one for each, else t1, t2, ..."""
-    for names in candidates:
-        given = [name for name in names if name and name == name.strip() and name.isprintable()]
-        if len(set(given)) == count:
-            return given
-    return [f"t{number}" for number in range(1, count + 1)]
+def choose_names(candidates: Mapping[str, Sequence[str | None]], count: int, reading: Reading) -> list[str]:
+    """Names of so many traces: the first of the candidates, by what they stand under, that has a different one for
+    each, else t1, t2, ...; noted if another one comes before that has names as well."""
+    doubts = []
+    for title, names in candidates.items():
+        if not any(names):
+            continue
+        doubt = _doubt_names(names)
+        if not doubt:
+            break
+        doubts.append(f"'{title}' {doubt}")
+    else:
+        title, names = "", [f"t{number}" for number in range(1, count + 1)]
+    if doubts:
+        chosen = f"have those of '{title}'" if title else "are called t1, t2, ... in the order of the file"
+        reading.notes.append(f"Names: {'; '.join(doubts)}. The traces {chosen}.")
+    return [name or "" for name in names]
+
+
+def _doubt_names(names: Sequence[str | None]) -> str:
+    """Why names do not tell traces apart; empty if they do."""
+    given = [name for name in names if name]
+    if len(given) < len(names):
+        return f"is missing of {len(names) - len(given)} of {len(names)}"
+    name, times = Counter(given).most_common(1)[0]
+    if times > 1:
+        return f"is not different for each ({show(name)} stands {times} times)"
+    odd = next((name for name in given if name != name.strip() or not name.isprintable()), None)
+    return "" if odd is None else f"cannot be used ({show(odd)} has blanks around it or signs that do not print)"
 
 
 def set_apart(names: Sequence[str]) -> dict[str, str]:

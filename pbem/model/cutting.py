@@ -12,6 +12,7 @@ from pbem.description.schema import CurveTable, LawTable, StageInterfaceTable
 from pbem.description.varying import VaryingTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.curve import Curve
+from pbem.geometry.cusp import EXPECTED, touch_only
 from pbem.geometry.expression import list_names
 from pbem.geometry.junction import find_crossing_cracks, format_point
 from pbem.geometry.network import Change, Network, cut_network
@@ -56,7 +57,7 @@ def cut_cracks(case: Case, roles: Roles, shapes: Shapes) -> Cut:
     if not networks:
         return Cut(case, roles, shapes)
     members = {trace: pieces for net in networks for trace, pieces in net.members.items()}
-    faults = tuple(fault for net in networks for fault in _find_overlaps(net))
+    faults = tuple(fault for net in networks for fault in _find_overlaps(net, own))
     taken = {piece for pieces in members.values() for piece in pieces if piece in case.curves and piece not in members}
     faults += tuple(
         Fault.at(("curves", name), f"curve '{name}', the name of a piece of a crack that is cut", "another name")
@@ -83,15 +84,19 @@ def cut_cracks(case: Case, roles: Roles, shapes: Shapes) -> Cut:
     )
 
 
-def _find_overlaps(network: Network) -> list[Fault]:
-    return [
-        Fault.at(
-            ("curves", change.trace),
-            f"curve '{change.trace}' running over curve '{change.other}' from {format_point(change.place)} on",
-            "each piece once",
-        )
-        for change in network.changes if change.kind == "merged"
-    ]
+def _find_overlaps(network: Network, cracks: Mapping[str, Curve]) -> list[Fault]:
+    faults = []
+    for change in network.changes:
+        if change.kind != "merged":
+            continue
+        where, what = format_point(change.place), f"curve '{change.trace}'"
+        if touch_only(cracks[change.trace].legs, cracks[change.other].legs, change.place):
+            found = f"{what} touching curve '{change.other}' near {where} without an angle between them"
+            faults.append(Fault.at(("curves", change.trace), found, EXPECTED))
+        else:
+            found = f"{what} running over curve '{change.other}' from {where} on"
+            faults.append(Fault.at(("curves", change.trace), found, "each piece once"))
+    return faults
 
 
 def _find_lengths(case: Case, cut: Sequence[str]) -> Iterator[Fault]:

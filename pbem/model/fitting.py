@@ -11,6 +11,7 @@ from pbem.arrays import Complex
 from pbem.description.case import Case
 from pbem.errors import Fault
 from pbem.geometry.curve import Curve
+from pbem.geometry.cusp import EXPECTED, describe_cusp
 from pbem.geometry.intersection import measure_distances
 from pbem.geometry.junction import format_point
 from pbem.geometry.tolerance import TIE
@@ -67,7 +68,7 @@ def fit_curves(
     last_bits = {end.point: choose_last_bit(end.power) for end in on_interfaces}
     sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order, inside, last_bits)
     if sizes.excess is not None:
-        return FittedCurves(curves, (), (), (_refuse(sizes.excess),))
+        return FittedCurves(curves, (), (), (_refuse(sizes.excess, curves),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     graded, near = _grade_contacts(case, sizes.curves, contacts)
     notes = [*_note_added(curves, sizes.curves, any(inside)), *near, *_note_ties(ties), *_note_long(sizes.long),
@@ -144,7 +145,12 @@ def _note_near(before: Mapping[str, Curve], after: Mapping[str, Curve]) -> list[
     return [f"Elements added where rounded faces in contact are nearest: {list_names(named, MOST_NAMED)}."]
 
 
-def _refuse(excess: Excess) -> Fault:
+def _refuse(excess: Excess, curves: Mapping[str, Curve]) -> Fault:
+    names = (excess.curve, excess.other)
+    wedge = describe_cusp(names, curves[excess.curve].legs, curves[excess.other].legs, excess.place)
+    if wedge is not None:
+        found = f"{wedge}, which would need endlessly short elements"
+        return Fault.at(("curves", excess.curve), found, EXPECTED)
     found = (
         f"curves '{excess.curve}' and '{excess.other}' at a distance of {excess.distance:.3g}, which would need "
         f"elements of {excess.length:.3g} and far more of them than requested"

@@ -31,12 +31,13 @@ MOST_ADDED = 100_000
 
 @dataclass(frozen=True)
 class Excess:
-    """Two curves so near to each other, at a distance (length), that the elements would become too many."""
+    """Two curves so near to each other, at a distance (length) at a place, that the elements would become too many."""
 
     curve: str
     other: str
     distance: float
     length: float
+    place: complex
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,8 @@ def _divide(field: LengthField) -> tuple[Cells, Real, Excess | None]:
                 worst = int(np.argmin(np.where(measured.final, np.inf, allowed)))
             one = names[cells.leg[worst]]
             other = names[measured.nearest[worst]] if measured.nearest[worst] >= 0 else one
-            return cells, allowed, Excess(one, other, float(measured.distance[worst]), float(allowed[worst]))
+            place = complex(field.place(cells)[worst])
+            return cells, allowed, Excess(one, other, float(measured.distance[worst]), float(allowed[worst]), place)
         done.append((cells.select(measured.final), measured.allowed[measured.final]))
         near = measured.near.pass_on(np.tile(np.flatnonzero(~measured.final), 2))
         cells = cells.select(~measured.final).halve()

@@ -45,7 +45,8 @@ def bring_in(name: str, text: str, *options: str) -> dict[str, Any]:
     return tomllib.loads(Path("made.toml").read_text(encoding="utf-8"))
 
 
-CROSS = write_map([[0, 0], [2, 0]], [[1, -1], [1, 1]], crs={"type": "name", "properties": {"name": "EPSG::3067"}})
+METRES = {"type": "name", "properties": {"name": "EPSG::3067"}}
+CROSS = write_map([[0, 0], [2, 0]], [[1, -1], [1, 1]], crs=METRES)
 
 
 def test_crossing_traces_are_cut_and_keep_their_names(capsys: Capture) -> None:
@@ -138,6 +139,38 @@ def test_names_come_from_a_unique_property(capsys: Capture) -> None:
     assert list(bring_in("map.geojson", write(7, 9.0))["curves"]) == ["7", "9"]
     for names in (("east", "east"), ("east", None), ("a\u001bb", "c")):
         assert list(bring_in("map.geojson", write(*names))["curves"]) == ["t1", "t2"]
+
+
+@pytest.mark.parametrize(("names", "told"), [
+    (("east", "west", "east"), "Names: 'name' is not different for each (\"east\" stands 2 times). The traces are"),
+    (("east", None, "west"), "Names: 'name' is missing of 1 of 3. The traces are called t1, t2, ..."),
+    (("east", "west", " north"),
+     "Names: 'name' cannot be used (\" north\" has blanks around it or signs that do not print)"),
+    (("east", "west", "north"), ""),
+    ((None, None, None), ""),
+])
+def test_names_that_do_not_tell_traces_apart_are_told(
+    names: Sequence[str | None], told: str, capsys: Capture
+) -> None:
+    """Of features, of rows of a table, and where another property serves instead."""
+    data = json.loads(write_map(*([[0, k], [1, k]] for k in range(3)), crs=METRES))
+    for feature, name in zip(data["features"], names, strict=True):
+        feature["properties"] = {"name": name}
+    bring_in("map.geojson", json.dumps(data))
+    said = capsys.readouterr().out
+    assert (told in said) if told else ("Names" not in said)
+    for number, feature in enumerate(data["features"]):
+        feature["properties"]["fid"] = 7 * number
+    curves = bring_in("map.geojson", json.dumps(data))["curves"]
+    said = capsys.readouterr().out
+    unique = not told and None not in names
+    assert list(curves) == ([*names] if unique else ["0", "7", "14"])
+    assert (told.partition(". The")[0] + ". The traces have those of 'fid'." in said) if told else ("Names" not in said)
+    if " north" not in names:
+        rows = [f"{name or ''},0,{k},1,{k}" for k, name in enumerate(names)]
+        bring_in("map.csv", "\n".join(["id,x1,y1,x2,y2", *rows]))
+        said = capsys.readouterr().out
+        assert (told.replace("'name'", "'id'") in said) if told else ("Names" not in said)
 
 
 def test_traces_with_names_of_pieces_of_others_have_laws_of_their_own(capsys: Capture) -> None:
@@ -255,6 +288,81 @@ def test_drawings_of_all_kinds(capsys: Capture) -> None:
     assert curves["t5"]["radius"] == 1 and "angles" not in curves["t5"]
     said = capsys.readouterr().out
     assert "CIRCLE 2: one point or none" in said and "1 TEXT: only LINE" in said
+
+
+LAYERS = """0
+SECTION
+2
+TABLES
+0
+TABLE
+2
+LAYER
+{}
+0
+ENDTAB
+0
+ENDSEC
+"""
+
+
+def test_what_a_drawing_does_not_show_is_left_out_and_told(capsys: Capture) -> None:
+    """Entities on layers that are frozen (a flag) or turned off (a negative colour), and invisible ones."""
+    layers = [(0, "LAYER", 2, name, 70, flag, 62, colour, 6, "CONTINUOUS")
+              for name, flag, colour in (("faults", 0, 7), ("guides", 0, -7), ("old", 1, 7))]
+    table = LAYERS.format("\n".join(str(each) for layer in layers for each in layer))
+    lines = [(0, "LINE", 8, layer, 60, hidden, 10, 0, 20, k, 11, 2, 21, k) for k, (layer, hidden) in enumerate(
+        [("faults", 0), ("GUIDES", 0), ("old", 0), ("old", 0), ("faults", 1), ("unknown", 0)])]
+    Path("map.dxf").write_text(table + write_dxf(*lines))
+    assert main(["import", "map.dxf", "-o", "made.toml"]) == 0
+    curves = tomllib.loads(Path("made.toml").read_text())["curves"]
+    assert [curve["points"][0][1] for curve in curves.values()] == [0, 5]
+    said = capsys.readouterr().out
+    for part in ('1 LINE on layer "GUIDES", which is turned off', '2 LINE on layer "old", which is frozen',
+                 "1 LINE that is set invisible"):
+        assert part in said
+    Path("map.dxf").write_text(table + write_dxf(*lines[1:2]))
+    assert main(["import", "map.dxf", "-o", "made.toml", "--force"]) == 2
+    assert 'on layer "GUIDES", which is turned off' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.77])
+@pytest.mark.parametrize("other", ["a line through", "a line from there", "a circle outside", "a circle inside"])
+def test_what_touches_a_circle_is_refused_for_that_reason(turn: float, other: str, capsys: Capture) -> None:
+    """Wherever they touch, on a mark of the circle or between two, in place of curves that run over each other."""
+    along = complex(np.exp(1j * turn))
+    at, tangent = 3 + 4j + 1.3 * along, 1j * along
+    ends = {"a line through": (at - 2 * tangent, at + 1.5 * tangent), "a line from there": (at, at + 2 * tangent)}
+    radius = {"a circle outside": 0.7, "a circle inside": -0.7}
+    circle = (0, "CIRCLE", 8, 0, 10, 3.0, 20, 4.0, 40, 1.3)
+    if other in ends:
+        one, two = ends[other]
+        second: Sequence[object] = (0, "LINE", 8, 0, 10, one.real, 20, one.imag, 11, two.real, 21, two.imag)
+    else:
+        center = at + radius[other] * along
+        second = (0, "CIRCLE", 8, 0, 10, center.real, 20, center.imag, 40, 0.7)
+    Path("map.dxf").write_text(write_dxf(circle, second))
+    assert main(["import", "map.dxf", "-o", "made.toml"]) == 2
+    said = capsys.readouterr().err
+    assert "without an angle between them" in said
+    x, y = (float(part) for part in said.partition(" near (" if " near (" in said else " at (")[2].partition(")")[0]
+            .split(","))
+    assert abs(complex(x, y) - at) < 0.02
+
+
+def test_cracks_at_a_very_small_angle_are_refused_with_the_angle() -> None:
+    """As no elements fit between them, in place of their distance."""
+    text = """
+materials.m = { young = 1.0, poisson = 0.2 }
+curves.a = { points = [[0, 0], [2, 0]], elements = 8 }
+curves.b = { points = [[0, 0], [2, 1e-4]], elements = 8 }
+regions.p = { material = "m", infinite = true, cracks = ["a", "b"] }
+interfaces.a.friction = 0.3
+interfaces.b.friction = 0.3
+"""
+    Path("case.toml").write_text(text)
+    with pytest.raises(pbem.CaseError, match=r"meeting at \(0, 0\) at an angle of 0.0029 degrees"):
+        make_checked_model("case.toml")
 
 
 @pytest.mark.parametrize("flag", [0, 8])

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.geometry.junction import format_point
+from pbem.geometry.tolerance import TIE
 from pbem.wording import list_names
 
 # Depths below this part of the largest jump of the curve come from the mesh, as at tips and corners ...
@@ -48,12 +49,16 @@ def find_pushed(
     np.fmax.at(largest, interface, jump)
     least = np.maximum(SLIGHT * largest, ROUNDING * float(np.ptp(position, axis=0).max()))
     depth = np.where(free, -np.nan_to_num(opening), 0.0)
-    deep = np.flatnonzero(depth > least[interface])
-    deep = deep[np.argsort(-depth[deep], kind="stable")]
-    _, firsts = np.unique(interface[deep], return_index=True)
+    deepest = np.zeros(len(names))
+    np.maximum.at(deepest, interface, depth)
+    # Of places that symmetry makes equal the first: their rounding must not choose, nor that of equal curves.
+    found = np.flatnonzero((depth > least[interface]) & (depth >= (1 - TIE) * deepest[interface]))
+    numbers, firsts = np.unique(interface[found], return_index=True)
+    order = sorted(zip(numbers.tolist(), found[firsts].tolist(), strict=True),
+                   key=lambda each: float(f"{-deepest[each[0]]:.6e}"))
     return [
         PushedFaces(names[number], bool(by_law[number]), float(depth[at]), complex(*position[at]))
-        for at, number in zip(deep[np.sort(firsts)].tolist(), interface[deep[np.sort(firsts)]].tolist(), strict=True)
+        for number, at in order
     ]
 
 

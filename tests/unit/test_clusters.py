@@ -14,6 +14,7 @@ from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.contact.loads import Load
 from pbem.contact.modes import Proposal
+from pbem.errors import StopError
 from pbem.solve.nonlinear.cluster_search import ClusterSearch, stack_states
 from pbem.solve.nonlinear.search import Search
 from pbem.solve.problem.problem import Problem
@@ -177,6 +178,35 @@ def test_values_are_those_of_the_clusters_and_of_the_leaders(grown: tuple[Proble
     for each in formed[:-1]:
         kept[each.pairs[each.kept]] = True
     np.testing.assert_array_equal(settled, kept[problem.laws.leader])
+
+
+def test_between_clusters_a_run_may_be_stopped(many_groups: None) -> None:
+    """By what the tangent operator was given to listen to: after each cluster, or within the first one's round."""
+    tangent, clusters, load = form_clusters(assemble(grow_branches(1, 10)))
+    chosen, stopped = choose_pairs(clusters._problem.laws.count, 7, 0.03), StopError("SIGTERM", "asked", 143)
+    asked, solved = [], []
+
+    def must_stop() -> bool:
+        asked.append(len(solved))
+        return len(asked) == most
+
+    def stop() -> None:
+        raise stopped
+
+    def solve(pairs: NDArray[np.int64], stiffness: Real) -> None:
+        solved.append(len(pairs))
+
+    tangent.listen(must_stop, stop)
+    found = tangent.find_clusters(load)
+    assert found is clusters and len(clusters.form(chosen)) >= 3
+    most = 0
+    clusters.solve(chosen, 1, solve)
+    assert asked == list(range(1, len(clusters.form(chosen)) + 1))
+    asked, solved, most = [], [], 2
+    with pytest.raises(StopError):
+        clusters.solve(chosen, 1, solve)
+    assert len(solved) == 2
+    tangent.destroy()
 
 
 def test_clusters_settle_as_long_as_fewer_and_fewer_pairs_change() -> None:

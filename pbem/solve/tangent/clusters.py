@@ -9,8 +9,9 @@ Comput. 17, 1996; X.-C. Cai, X. Li, SIAM J. Sci. Comput. 33, 2011). Unlike the g
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from scipy import sparse
@@ -46,10 +47,16 @@ class Cluster:
 
 
 class Clusters:
-    """Forms clusters around pairs, and lets them be solved for; alike on all ranks."""
+    """Forms clusters around pairs, and lets them be solved for; alike on all ranks.
 
-    def __init__(self, problem: Problem, preconditioner: SchwarzPreconditioner, load: Load) -> None:
-        self._problem, self._preconditioner, self._load = problem, preconditioner, load
+    pause: called between clusters, by all ranks together, where the run may be stopped.
+    """
+
+    def __init__(
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, load: Load,
+        pause: Callable[[], object] = lambda: None,
+    ) -> None:
+        self._problem, self._preconditioner, self._load, self._pause = problem, preconditioner, load, pause
         mesh, follows = problem.mesh, problem.laws.follows
         self._pair_of_node = np.full(mesh.nodes, -1)
         self._pair_of_node[mesh.pairs.slave] = np.where(follows, -1, np.arange(mesh.pairs.count))
@@ -67,13 +74,16 @@ class Clusters:
     def solve(self, chosen: Bool, columns: int, solve: SolveCluster) -> tuple[Real, Bool]:
         """See PairClusters; each rank for some of the clusters."""
         problem, comm = self._problem, self._problem.comm
-        own = self.form(chosen)[comm.rank :: comm.size]
+        formed = self.form(chosen)
         found = np.zeros((len(chosen), columns + 1))
         with clock.piece("clusters"):
-            for each, stiffness in self._list_stiffness(own):
-                values = solve(each.pairs, stiffness)
-                if values is not None:
-                    found[each.pairs[each.kept]] = np.column_stack([values, np.ones(len(values))])[each.kept]
+            own = self._list_stiffness(formed[comm.rank :: comm.size])
+            for _ in range(0, len(formed), comm.size):
+                for each, stiffness in islice(own, 1):  # none on the last ranks in the last round
+                    values = solve(each.pairs, stiffness)
+                    if values is not None:
+                        found[each.pairs[each.kept]] = np.column_stack([values, np.ones(len(values))])[each.kept]
+                self._pause()
         found = add_up(comm, found)[problem.laws.leader]
         return found[:, :-1], found[:, -1] > 0
 

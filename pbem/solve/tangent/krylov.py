@@ -89,8 +89,7 @@ class KrylovTangent(TangentOperator):
         self._product = SharedProduct(problem, shared)
         self._groups, self._widen_groups = groups, widen
         self.constraints: ConstraintMap | None = None
-        # That of which GMRES has its directions.
-        self._known: ConstraintMap | None = None
+        self._known: ConstraintMap | None = None  # that of which GMRES has its directions
         self.solution: Real | None = None
         self.law: Linearisation | None = None
         # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
@@ -322,7 +321,8 @@ class KrylovTangent(TangentOperator):
 
     def find_clusters(self, load: Load) -> Clusters | None:
         """See TangentOperator."""
-        return self._local.find_clusters(load) if self.settling.nearby else None
+        return self._local.find_clusters(
+            load, lambda: self._space.must_stop() and self._stop()) if self.settling.nearby else None
 
     def gather(self, part: Real) -> Real:
         """A vector (unknowns,) on every rank, in the order of the nodes, from the ranks' parts."""

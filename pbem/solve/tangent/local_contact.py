@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from pbem.contact.loads import Load
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
@@ -32,8 +32,8 @@ class LocalContact:
             self._sweeps = Sweeps(self._problem, self._preconditioner, self._groups, load)
         return self._sweeps
 
-    def find_clusters(self, load: Load) -> Clusters:
-        """Clusters; under any load of the problem."""
+    def find_clusters(self, load: Load, pause: Callable[[], object]) -> Clusters:
+        """Clusters; under any load of the problem. pause: see Clusters."""
         if self._clusters is None:
-            self._clusters = Clusters(self._problem, self._preconditioner, load)
+            self._clusters = Clusters(self._problem, self._preconditioner, load, pause)
         return self._clusters

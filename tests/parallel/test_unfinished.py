@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem import parallel
 from pbem.cli import main
 from pbem.errors import StopError
 from pbem.results.reader import Results, open_results
@@ -122,6 +123,8 @@ def test_clusters_settle_after_a_run_is_resumed_too(
 ) -> None:
     """A network whose laws are smoothed for too short, and whose clusters settle by themselves after that."""
     monkeypatch.setattr(smooth_search, "LONGEST", 2)
+    # On a slow machine the run would stop between clusters, with the iteration before them to be made again.
+    monkeypatch.setattr(parallel, "PATIENCE", np.inf)
     (tmp_path / "case.toml").write_text(grow_branches(0, 6))
     asked = []
 

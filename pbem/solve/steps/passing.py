@@ -18,7 +18,9 @@ SLIGHT = 1e-2
 
 @dataclass(frozen=True)
 class Passing:
-    """Of two bodies the deepest place (complex) of the first inside of the second, and how deep it lies (length)."""
+    """Of two bodies the deepest place (complex) of the first inside of the second, and how deep it lies (length).
+
+    They are the same one where the sides of a gap in it are moved into each other."""
 
     first: str
     second: str
@@ -51,6 +53,11 @@ def find_passing(model: Model, mesh: Mesh, displacement: Complex) -> Passing | N
 
 def describe_passing(found: Passing) -> str:
     """A sentence, and what to do."""
+    if found.first == found.second:
+        return (
+            f"sides of '{found.first}' lie {found.depth:.3g} deep in each other at ({found.place.real:.6g}, "
+            f"{found.place.imag:.6g}), across what was a gap: nothing keeps them apart; draw them as curves of their "
+            "own and add a table [contacts.NAME] between these if they are to touch")
     return (
         f"'{found.first}' lies {found.depth:.3g} deep inside '{found.second}' at ({found.place.real:.6g}, "
         f"{found.place.imag:.6g}): nothing keeps them apart, as they have no contact with each other; add a table "

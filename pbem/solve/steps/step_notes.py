@@ -11,9 +11,10 @@ from pbem.parallel import do_on_first
 from pbem.solve.nonlinear.imbalance import describe_imbalance
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Reporter, Step
+from pbem.solve.steps.closed_gaps import find_closed_gap
 from pbem.solve.steps.linearity import describe_nonlinearity, measure_excess
 from pbem.solve.steps.open_faces import PushedFaces, describe_pushed, find_pushed
-from pbem.solve.steps.passing import describe_passing, find_passing
+from pbem.solve.steps.passing import Passing, describe_passing, find_passing
 
 
 def note_imbalance(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
@@ -49,9 +50,16 @@ def note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Repo
 
 
 def note_passing(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
-    """Note bodies that have moved into each other, if twice as deep as was noted before; returns what is noted now."""
-    moved = step.displacement[: problem.mesh.nodes]
-    found = do_on_first(problem.comm, ConvergenceError, lambda: find_passing(problem.model, problem.mesh, moved))
+    """Note bodies that have moved into each other, or sides of one across a gap, if twice as deep as was noted before;
+    returns what is noted now."""
+    model, mesh = problem.model, problem.mesh
+
+    def find() -> Passing | None:
+        found = (find_passing(model, mesh, step.displacement[: mesh.nodes]),
+                 find_closed_gap(model, mesh, step.displacement))
+        return max((each for each in found if each is not None), key=lambda each: each.depth, default=None)
+
+    found = do_on_first(problem.comm, ConvergenceError, find)
     if found is None or found.depth <= 2 * noted:
         return noted
     reporter.note(f"Step {step.number}: {describe_passing(found)}.")

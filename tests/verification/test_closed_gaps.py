@@ -1,0 +1,96 @@
+"""Sides of slots and notches that are moved into each other without a contact are told, with the depth; others not."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.case.build import parse_model
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import list_faces
+from pbem.solve.steps.closed_gaps import find_closed_gap
+from tests.verification.test_open_faces import DEPTH, SilentReporter
+
+
+class Noting(SilentReporter):
+    """Keeps what a step is told of sides."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        """Keep it."""
+        if "deep in each other" in text:
+            self.notes.append(text)
+
+
+def write_slot(
+    width: float, stress: float, turn: float = 0.0, unit: float = 1.0, at: complex = 0j, more: str = ""
+) -> str:
+    """A slot of the length 2 and a width in an infinite region, turned, under a stress across it; in other units."""
+    corners = [complex(x, y * width / 2) for x, y in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
+    a, b, c, d = (at + unit * corner * np.exp(1j * turn) for corner in corners)
+    lines = {"left": (a, b), "above": (b, c), "right": (c, d), "below": (d, a)}
+    curves = "\n".join(
+        f"curves.{name} = {{ points = [[{p.real!r}, {p.imag!r}], [{q.real!r}, {q.imag!r}]], "
+        f"elements = {dict(above=10, below=13).get(name, 1)} }}" for name, (p, q) in lines.items())
+    across = 1j * np.exp(1j * turn)
+    sxx, syy, sxy = (stress * each for each in (across.real**2, across.imag**2, across.real * across.imag))
+    return f"""
+materials.rock = {{ young = 1e3, poisson = 0.25 }}
+remote = {{ sxx = {sxx}, syy = {syy}, sxy = {sxy} }}
+stages = [{{ name = "load", steps = 1 }}]
+{curves}
+regions.plane = {{ material = "rock", infinite = true, boundary = ["left", "above", "right", "below"] }}
+{more}
+"""
+
+
+def solve(text: str, folder: Path) -> list[str]:
+    """The notes of the run on sides in each other."""
+    (folder / "case.toml").write_text(text, encoding="utf-8")
+    listener = Noting()
+    pbem.run(folder / "case.toml", folder / "case.h5", force=True, reporter=listener)
+    return listener.notes
+
+
+@pytest.mark.parametrize(("turn", "unit", "at"), [(0.0, 1.0, 0j), (0.6, 1e-6, 0j), (2.0, 1e3, 5e5 - 1e6j)])
+def test_a_slot_that_closes_is_told_with_the_depth(turn: float, unit: float, at: complex, tmp_path: Path) -> None:
+    """A thin slot closes as a crack does: by 4 s (1 - nu^2)/E sqrt(a^2 - x^2), less its width."""
+    (note,) = solve(write_slot(0.002, -1.0, turn, unit, at), tmp_path)
+    match = re.search(r"sides of 'plane' lie (\S+) deep in each other at \((\S+), (\S+)\)", note)
+    assert match is not None
+    np.testing.assert_allclose(float(match[1]), (DEPTH - 0.002) * unit, rtol=0.02)
+    assert abs(complex(float(match[2]), float(match[3])) - at) < 0.2 * unit
+
+
+@pytest.mark.parametrize(("width", "stress", "more"), [
+    (0.002, 1.0, ""), (0.005, -1.0, ""), (0.002, -0.4, ""),
+    (0.002, -1.0, 'contacts.slot = { between = ["above", "below"], friction = 0.3 }'),
+])  # fmt: skip
+def test_slots_that_open_that_are_wide_or_that_have_a_contact_are_not_told(
+    width: float, stress: float, more: str, tmp_path: Path
+) -> None:
+    assert not solve(write_slot(width, stress, more=more), tmp_path)
+
+
+def test_motions_of_a_body_close_no_gap() -> None:
+    """However large: a translation, a rotation about a far point, a stretch along it, thin bodies pressed flat."""
+    text = write_slot(1e-4, -1.0).replace("infinite = true, ", "").replace(
+        'boundary = ["left"', 'boundary = ["outline", "left"').replace("remote", "#") + """
+curves.outline = { points = [[-2, -1e-3], [2, -1e-3], [2, 1e-3], [-2, 1e-3], [-2, -1e-3]], elements = [9, 1, 11, 1] }
+boundary.outline = { ux = 0.0, uy = 0.0 }
+"""
+    model = parse_model(text)[1]
+    mesh = generate_mesh(model)
+    place = list_faces(mesh).position
+    outer = np.abs(place.imag) > 5e-4
+    for motion in (3.0 - 2j + 0 * place, 0.05j * (place - 7), 0.3 * place.real, -2j * place.imag * outer):
+        assert find_closed_gap(model, mesh, motion) is None
+    found = find_closed_gap(model, mesh, np.where(np.abs(place.imag) < 1e-4, -4e-4j * np.sign(place.imag), 0j))
+    assert found is not None
+    np.testing.assert_allclose(found.depth, 7e-4, rtol=1e-6)

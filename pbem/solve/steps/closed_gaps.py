@@ -1,4 +1,4 @@
-"""Sides of a slot, a notch or a hole that are moved into each other: of one body, without a contact between them."""
+"""Free sides that are moved into each other across a gap, a slot or a notch, without a contact between them."""
 
 from __future__ import annotations
 
@@ -17,76 +17,81 @@ FACING = 0.7
 # What closes a gap is known but for this part of itself, as the node across is not quite opposite, and for this part of
 # the most by which two sides come nearer to each other or part.
 ASIDE, MESH = 0.05, 1e-3
+# Gaps are looked for around these parts of the largest one that displacements can close.
+AROUND = (0.0, *(0.5**k for k in range(10, -1, -1)))
 
 
 def find_closed_gap(model: Model, mesh: Mesh, displacement: Complex) -> Passing | None:
-    """The deepest place where a side of a body has come to lie inside of the same body, across what was a gap.
+    """The deepest place where a free side of a body has come to lie inside of the same body, or of another one, across
+    what was a gap.
 
-    displacement (f,): at the nodes of `list_faces(mesh)`. Of the node across, which is the nearest one whose normal is
-    about the opposite one, the tangent is taken, with what it turns and stretches by. Faces of cracks, interfaces and
-    contacts are left out. None if there is none.
+    displacement (f,): at the nodes of `list_faces(mesh)`. Of the node across, which is the nearest one along the normal
+    whose own normal is about the opposite one, the tangent is taken, with what it turns and stretches by. Sides that a
+    stage has bared by removing a region are free as well; faces of cracks and interfaces are not, nor are two curves
+    that have a contact with each other. None if there is none.
     """
-    free = _find_free(mesh)
-    if not free.any():
+    own = np.flatnonzero(_find_free(model, mesh))
+    if len(own) < 2:
         return None
     stretch, direction = (each[: mesh.nodes] for each in evaluate_stretch(mesh, displacement))
-    worst: Passing | None = None
-    for number, region in enumerate(model.regions):
-        own = np.flatnonzero(free & (mesh.node_region == number))
-        if region.rigid or region.removed or len(own) < 2:
-            continue
-        moved = displacement[own] - displacement[own].mean()
-        reach = 2 * float(np.abs(moved).max())
-        across, gap = _look_across(mesh, own, reach)
-        normal = mesh.normal[own]
-        along = ((mesh.position[own] + gap * normal - mesh.position[across]) * np.conj(direction[across])).real
-        nearer = displacement[own] - displacement[across] - along * stretch[across]
-        closed = np.where(gap > 0, (nearer * np.conj(normal)).real, 0.0)
-        depth = np.where(_have_contact(model, mesh, own, across), 0.0, closed - gap)
-        depth[depth <= np.maximum(ASIDE * closed, MESH * np.abs(closed).max())] = 0.0
-        # Of places that symmetry makes equal the first: their rounding must not choose.
-        at = int(np.flatnonzero(depth >= (1 - TIE) * depth.max())[0])
-        if depth[at] > (0.0 if worst is None else worst.depth):
-            place = complex(mesh.position[own[at]] + displacement[own[at]]) + model.origin
-            worst = Passing(region.name, region.name, float(depth[at]), place)
-    return worst
+    reach = 2 * float(np.abs(displacement[own] - displacement[own].mean()).max())
+    across, gap = _look_across(mesh, own, reach)
+    normal = mesh.normal[own]
+    along = ((mesh.position[own] + gap * normal - mesh.position[across]) * np.conj(direction[across])).real
+    nearer = displacement[own] - displacement[across] - along * stretch[across]
+    closed = np.where(gap > 0, (nearer * np.conj(normal)).real, 0.0)
+    depth = np.where(_have_contact(model, mesh, own, across), 0.0, closed - gap)
+    depth[depth <= np.maximum(ASIDE * closed, MESH * np.abs(closed).max())] = 0.0
+    # Of places that symmetry makes equal the first: their rounding must not choose.
+    at = int(np.flatnonzero(depth >= (1 - TIE) * depth.max())[0])
+    if depth[at] <= 0.0:
+        return None
+    names = [mesh.region_names[mesh.node_region[node]] for node in (own[at], across[at])]
+    place = complex(mesh.position[own[at]] + displacement[own[at]]) + model.origin
+    return Passing(names[0], names[1], float(depth[at]), place)
 
 
-def _find_free(mesh: Mesh) -> Bool:
-    """Nodes (n,) on curves that bound one region alone."""
-    bounding = ~mesh.crack
-    owners = np.unique(np.column_stack([mesh.curve, mesh.region])[bounding], axis=0)
+def _find_free(model: Model, mesh: Mesh) -> Bool:
+    """Nodes (n,) on curves that bound one region alone, of those that are there, if it is no tool."""
+    there = np.array([not region.removed for region in model.regions])[mesh.region] & ~mesh.crack
+    owners = np.unique(np.column_stack([mesh.curve, mesh.region])[there], axis=0)
     count = np.bincount(owners[:, 0], minlength=len(mesh.curve_names))
-    return np.asarray((bounding & (count[mesh.curve] == 1))[mesh.node_element])
+    rigid = np.array([region.rigid for region in model.regions])[mesh.region]
+    return np.asarray((there & ~rigid & (count[mesh.curve] == 1))[mesh.node_element])
 
 
 def _look_across(mesh: Mesh, own: Integer, reach: float) -> tuple[Integer, Real]:
-    """Per node (k,) of one body the number of the node across within about a reach (of itself if there is none), and
-    the gap along the node's normal; 0 where there is none."""
+    """Per node (k,) the number of the node across (of itself if there is none), and the gap along the node's normal,
+    at most about as long as the reach; 0 where there is none."""
     count = len(own)
+    position, normal = mesh.position[own], mesh.normal[own]
+    best, least = np.arange(count), np.full(count, np.inf)
     if reach == 0.0:
         return own, np.zeros(count)
-    position, normal = mesh.position[own], mesh.normal[own]
-    # Beside the node itself are nodes as near as those across: their normals tell them apart.
-    ends = np.column_stack([position.real, position.imag, reach * normal.real, reach * normal.imag])
-    distance, found = cKDTree(ends).query(ends * [1.0, 1.0, -1.0, -1.0], distance_upper_bound=2 * reach)
-    found = np.where(np.isfinite(distance), found, np.arange(count))
-    toward = position[found] - position
-    facing = (normal * np.conj(normal[found])).real
+    # Beside the node itself, and behind it, are nodes as near as those across: their normals and the place tell them
+    # apart.
+    tree = cKDTree(np.column_stack([position.real, position.imag, reach * normal.real, reach * normal.imag]))
     size = mesh.geometry.lengths[mesh.node_element[own]]
-    gap = np.zeros(count)
-    at = facing < -FACING
-    gap[at] = (toward * np.conj(normal[found])).real[at] / facing[at]
-    aside = np.abs(toward - gap * normal)
-    return own[found], np.where((gap > 0) & (aside <= np.maximum(size, size[found])), gap, 0.0)
+    for part in AROUND:
+        ahead = position + part * reach * normal
+        ends = np.column_stack([ahead.real, ahead.imag, -reach * normal.real, -reach * normal.imag])
+        distance, found = tree.query(ends, distance_upper_bound=2 * reach)
+        found = np.where(np.isfinite(distance), found, np.arange(count))
+        toward, facing = position[found] - position, (normal * np.conj(normal[found])).real
+        gap = np.zeros(count)
+        at = facing < -FACING
+        gap[at] = (toward * np.conj(normal[found])).real[at] / facing[at]
+        better = (gap > 0) & (gap < least)
+        better &= np.abs(toward - gap * normal) <= np.maximum(size, size[found])
+        best[better], least[better] = found[better], gap[better]
+    return own[best], np.where(np.isfinite(least), least, 0.0)
 
 
 def _have_contact(model: Model, mesh: Mesh, own: Integer, across: Integer) -> Bool:
     """Whether nodes (k,) and those across are on the two curves of a contact."""
-    numbers = {name: number for number, name in enumerate(mesh.curve_names)}
-    joined = np.zeros((len(mesh.curve_names), len(mesh.curve_names)), dtype=bool)
-    for contact in model.contacts.values():
-        one, other = numbers[contact.first], numbers[contact.second]
-        joined[one, other] = joined[other, one] = True
-    curve = mesh.curve[mesh.node_element]
-    return np.asarray(joined[curve[own], curve[across]])
+    numbers, count = {name: number for number, name in enumerate(mesh.curve_names)}, len(mesh.curve_names)
+    joined = np.array([(numbers[each.first], numbers[each.second]) for each in model.contacts.values()
+                       if each.first in numbers and each.second in numbers], dtype=np.int64).reshape(-1, 2)
+    one, other = (mesh.curve[mesh.node_element[nodes]] for nodes in (own, across))
+    both = np.minimum(one, other) * count + np.maximum(one, other)
+    return np.isin(both, joined.min(axis=1, initial=count) * count + joined.max(axis=1, initial=0))

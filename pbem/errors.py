@@ -97,14 +97,17 @@ class ConvergenceError(PbemError):
     detail: where, and what to try, in sentences. places: points (in the coordinates of the model) of the pairs whose
     contact did not settle, where shorter elements may help; none if they would not, or if there are too many.
     unless: of "free motion" in the last statuses of a search that did not settle, what else may be the reason
-    (`pbem.solve.nonlinear.unsettled.Unsettled`).
+    (`pbem.solve.nonlinear.unsettled.Unsettled`). restless: whether dashpots did not bring the contact to rest either.
     """
 
-    def __init__(self, reason: str, detail: str, places: tuple[complex, ...] = (), unless: Any = None) -> None:
+    def __init__(
+        self, reason: str, detail: str, places: tuple[complex, ...] = (), unless: Any = None, restless: bool = False
+    ) -> None:
         self.reason = reason
         self.detail = detail
         self.places = places
         self.unless = unless
+        self.restless = restless
         super().__init__(f"{reason}: {detail}")
 
 

@@ -35,7 +35,7 @@ from pbem.contact.laws import (
     resists_slip,
     tensile_limit,
 )
-from pbem.contact.pivoting import OperationCount, solve_by_pivoting
+from pbem.contact.pivoting import OperationCount, pivot_from
 from pbem.contact.seat import evaluate_dilation, read_dilation
 
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
@@ -193,8 +193,13 @@ def find_compliance(pairs: PairProblem) -> tuple[Real | None, bool]:
     return (found if np.isfinite(found).all() else None), sprung
 
 
-def pivot_pairs(pairs: PairProblem, compliance: Real, detached: Bool) -> ModeState | None:
-    """The modes of the complementarity problem in which some pairs are detached; None where it fails (theory, 56)."""
+def pivot_pairs(
+    pairs: PairProblem, compliance: Real, detached: Bool, near: ModeState | None = None
+) -> ModeState | None:
+    """The modes of the complementarity problem in which some pairs are detached; None where it fails (theory, 56).
+
+    near (s,): modes that may be near to them, from which fewer pivots lead there.
+    """
     count = len(detached)
     # In a unit of length in which compliances are numbers of about one.
     softness = float(np.abs(np.diag(compliance)).mean()) or 1.0
@@ -223,8 +228,9 @@ def pivot_pairs(pairs: PairProblem, compliance: Real, detached: Bool) -> ModeSta
     constant = np.concatenate([jump[closed], -slip_at_rest, slip_at_rest, pairs.adhesion[closed[rough]]])
     # Many bounds are zero at rest: unequal small numbers keep the pivoting from going round among them.
     constant += PERTURBATION * np.abs(constant).max(initial=0.0) * (1 + np.arange(len(constant)) * 0.6180339887 % 1)
-    found = solve_by_pivoting(matrix, constant)
-    pairs.effort.take(4.0 * found.pivots * len(constant) ** 2)
+    start = np.zeros(len(constant), dtype=bool) if near is None else _find_basis(pairs, near, closed, rough)
+    found = pivot_from(matrix, constant, start)
+    pairs.effort.take(4.0 * found.pivots * len(constant) ** 2 + 2.0 * start.sum() * len(constant) ** 2)
     if found.ended != "solution":
         return None
     mode, sign = np.full(count, OPEN, dtype=np.int8), pairs.sign.copy()
@@ -235,6 +241,18 @@ def pivot_pairs(pairs: PairProblem, compliance: Real, detached: Bool) -> ModeSta
     forward[closed[rough]] = found.z[size[0]] > found.z[size[1]]
     sign[slides] = np.where(forward[slides], 1.0, -1.0)
     return ModeState(mode, sign)
+
+
+def _find_basis(pairs: PairProblem, modes: ModeState, closed: Integer, rough: Integer) -> Bool:
+    """Which unknowns of the complementarity problem of the closed pairs are basic in some modes (n + 3 r,).
+
+    Pairs that part slide without N. The sense of what sticks is that of its traction, of what parts that of its slip.
+    """
+    d = solve_in_modes(pairs, modes)
+    along, moved = (np.zeros((2, len(modes.mode))) if d is None else pairs.constant[[1, 3]] + pairs.change[[1, 3]] @ d)
+    sense = np.where(modes.mode == STICK, along, np.where(modes.mode == OPEN, moved, modes.sign))[closed[rough]]
+    slides = modes.mode[closed[rough]] != STICK
+    return np.concatenate([modes.mode[closed] != OPEN, sense >= 0, sense < 0, slides])
 
 
 def solve_in_modes(pairs: PairProblem, modes: ModeState) -> Real | None:

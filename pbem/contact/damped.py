@@ -21,7 +21,7 @@ from pbem.contact.laws import OPEN, ModeState, PairState, plastic_slip
 from pbem.contact.modes import Proposal, measure_law_error
 from pbem.contact.pivoting import OperationCount
 from pbem.contact.running import NEAR, Rest
-from pbem.contact.subset import settle_subset
+from pbem.contact.subset import find_losing, find_weak, part_for_good, step_subset
 
 # Stiffness of the dashpots at first, relative to the median of the pairs' own; the part to which it falls from instant
 # to instant; and how many instants there are. Of a motion that goes on quickly the way may matter: slowly as well.
@@ -35,6 +35,10 @@ APPROACH = 1e-6
 # Problems of contact at most, of so many pairs, as in pbem.contact.running; of more pairs fewer. Friction that changes
 # with slip is taken at the slips of the problem before, in one instant so often at most.
 MOST_SOLVED, OF_PAIRS, MOST_TAKEN = 1000, 100, 100
+# Newton's steps of an instant before it is pivoted: those that lead to its modes are few.
+MOST_STEPS = 25
+# Instants in turn in which faces lack the strength that they lost in them: what follows leads to no equilibrium either.
+MOST_PARTED = 3
 # Operations that they may take, all together.
 MOST_EFFORT = 5e10
 
@@ -69,14 +73,14 @@ def come_to_rest(
     runs: ModeState | None = None
     left = round(MOST_SOLVED * min(OF_PAIRS / subset.laws.count, 1.0) ** 2)
     for first, part, most in SCHEDULES:
-        stiffness, motion, steady = first * own, np.zeros_like(before), 0
+        stiffness, motion, steady, lacking = first * own, np.zeros_like(before), 0, 0
         modes, present, jumps = subset.modes, response, before / response.length_unit
         for _ in range(most):
             found = _solve_instant(replace(subset, modes=modes), present, judge, stiffness, jumps, left)
             if found is None:
                 break
-            now, present, left = found
-            instants, held = instants + 1, holds(now)
+            now, present, left, lawful = found
+            instants, lacking, held = instants + 1, 0 if lawful else lacking + 1, holds(now)
             rest = _stay(replace(subset, modes=now), present, judge) if held else None
             if rest:
                 return Damped(rest, None, instants)
@@ -84,8 +88,8 @@ def come_to_rest(
             off = np.abs(moved - motion / part).max(initial=0.0)
             # What holds the bodies resists only once it has been strained.
             goes_on = same and not held and off <= STEADY * np.abs(moved).max(initial=0.0) and not _closes(now, moved)
-            steady = steady + 1 if goes_on else 0
-            if steady == IN_TURN:
+            steady = steady + 1 if goes_on and lawful else 0
+            if steady == IN_TURN or lacking == MOST_PARTED:
                 break
             modes, jumps, motion, stiffness = now, present.values[:, 2:], moved, stiffness * part
         if steady < IN_TURN:
@@ -127,20 +131,35 @@ def _move(response: Response, d: Real) -> Response:
 
 def _solve_instant(
     subset: Subset, response: Response, judge: Judge, stiffness: float, jumps: Real, left: int
-) -> tuple[ModeState, Response, int] | None:
-    """The modes of one instant, the response from its states on, and how many problems are left; None if not found.
+) -> tuple[ModeState, Response, int, bool] | None:
+    """The modes of one instant, the response from its states on, how many problems are left, and whether the laws hold
+    in it; None if not found.
 
-    Where friction changes with slip the bound is taken at the slips of the last time, as in pbem.contact.running.
+    Where friction changes with slip the bound is taken at the slips of the last time, as in pbem.contact.running. Where
+    Newton's steps find no modes, what parts in this instant has no strength in it, and if it touches again none before
+    the next one.
     """
+    before, lost = subset, np.zeros(subset.laws.count, dtype=bool)
     for taken in range(1, min(left, MOST_TAKEN) + 1):
         damped = _damp(response, stiffness, jumps)
-        found = settle_subset(subset, damped, judge).modes
-        d = None if found is None else solve_in_modes(pose(subset, damped), found)
-        if found is None or d is None:
+        problem = pose(subset, damped)
+        found = None
+        if not lost.any():
+            found = step_subset(problem, subset.modes, damped, judge, most=MOST_STEPS, shares=(0.0,))
+        if found is None:
+            parted = part_for_good(before, damped, find_losing(before, problem) & (before.modes.mode == OPEN))
+            if parted is None:
+                return None
+            found, lost = parted
+            subset = replace(before, memory=before.memory.lose(before.memory.broken | lost))
+            problem = pose(subset, damped)
+        d = solve_in_modes(problem, found)
+        if d is None:
             return None
-        subset, response = replace(subset, modes=found), _move(response, d)
+        stays = not judge(found, damped.evaluate(d)).changed.any()
+        before, subset, response = replace(before, modes=found), replace(subset, modes=found), _move(response, d)
         if _fulfils(subset, _damp(response, stiffness, jumps)):
-            return found, response, left - taken
+            return found, response, left - taken, stays and not find_weak(found, lost).any()
     return None
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg.blas import dger
+from scipy.linalg.lapack import dgecon, dgetrf, dgetrs
 
 from pbem.arrays import Bool, Integer, Real
 
@@ -81,6 +82,33 @@ def solve_by_pivoting(matrix: Real, constant: Real) -> Pivoted:
             return _finish("ray", table, basis, pivots)
         row = found
     return _finish("limit", table, basis, MOST_PIVOTS * count)
+
+
+def pivot_from(matrix: Real, constant: Real, start: Bool) -> Pivoted:
+    """As solve_by_pivoting, from the complementary basis in which z is basic where `start` (n,) says so.
+
+    Near to the solution that takes few pivots: a principal transform makes it the basis of w, and is undone at the end.
+    Where that leads to no solution, or the basis is singular, it begins anew without.
+    """
+    own, rest = np.flatnonzero(start), np.flatnonzero(~start)
+    factors, places, failed = dgetrf(matrix[np.ix_(own, own)]) if len(own) else (np.zeros((0, 0)), np.zeros(0), 0)
+    if failed or not len(own) or not dgecon(factors, np.abs(matrix[np.ix_(own, own)]).sum(axis=0).max())[0] > ROUNDING:
+        return solve_by_pivoting(matrix, constant)
+    given = np.column_stack([np.eye(len(own)), matrix[np.ix_(own, rest)], constant[own]])
+    solved = dgetrs(factors, places, given)[0]
+    inverse, across, value = solved[:, : len(own)], solved[:, len(own) : -1], solved[:, -1]
+    beside = matrix[np.ix_(rest, own)]
+    moved, offset = np.empty_like(matrix), np.empty_like(constant)
+    moved[np.ix_(own, own)], moved[np.ix_(own, rest)], offset[own] = inverse, -across, -value
+    moved[np.ix_(rest, own)] = beside @ inverse
+    moved[np.ix_(rest, rest)] = matrix[np.ix_(rest, rest)] - beside @ across
+    offset[rest] = constant[rest] - beside @ value
+    found = solve_by_pivoting(moved, offset)
+    if found.ended != "solution":
+        return solve_by_pivoting(matrix, constant)
+    z, w = found.z, offset + moved @ found.z
+    basic = found.basic != start
+    return Pivoted("solution", np.where(start, np.where(basic, w, 0.0), z), basic, found.pivots)
 
 
 def _exchange(table: Real, row: int, column: int) -> None:

@@ -70,9 +70,9 @@ def settle_subset(
     once the subset's effort is spent.
     """
     problem = pose(subset, response)
-    loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
+    loses = find_losing(subset, problem)
     none = np.zeros(len(loses), dtype=bool)
-    stepped = _step(problem, subset.modes, response, judge, holds)
+    stepped = step_subset(problem, subset.modes, response, judge, holds)
     if stepped is not None:
         return Settled(stepped, False, 0, none)
     compliance, sprung = find_compliance(problem)
@@ -109,19 +109,20 @@ def settle_subset(
     return Settled(None, complete and bool(loses.any()) and len(tried) >= 2 ** int(loses.sum()), len(tried), wrong)
 
 
-def _step(
+def step_subset(
     problem: PairProblem, modes: ModeState, response: Response, judge: Callable[[ModeState, PairState], Proposal],
-    holds: Callable[[ModeState], bool],
+    holds: Callable[[ModeState], bool] = lambda modes: True, most: int = MOST_STEPS,
+    shares: tuple[float, ...] = SHARES,
 ) -> ModeState | None:
     """Modes by Newton's steps among these pairs alone; None where they come back, take too many or free a body.
 
     Along a slender wedge the end of contact moves by an element or two in a step, however many there are.
     """
-    for share in SHARES:
-        if share == 1.0 and len(modes.mode) > MOST_STEPS:  # it would not come to the end
+    for share in shares:
+        if share == 1.0 and len(modes.mode) > most:  # it would not come to the end
             break
         seen: set[bytes] = set()
-        while len(seen) < MOST_STEPS and not problem.effort.is_spent and modes.fingerprint() not in seen:
+        while len(seen) < most and not problem.effort.is_spent and modes.fingerprint() not in seen:
             seen.add(modes.fingerprint())
             d = solve_in_modes(problem, modes) if holds(modes) else None
             if d is None:
@@ -133,38 +134,60 @@ def _step(
     return None
 
 
+def find_losing(subset: Subset, problem: PairProblem) -> Bool:
+    """The pairs (s,) that have less to bear where they part: cohesion, tensile strength, or friction under a fluid."""
+    return (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
+
+
+def part_for_good(
+    subset: Subset, response: Response, lost: Bool, compliance: Real | None = None,
+    holds: Callable[[ModeState], bool] = lambda modes: True,
+) -> tuple[ModeState, Bool] | None:
+    """Modes of s pairs where those that part lose what they can lose, also where they touch again; and which have (s,).
+
+    lost: those that have from the beginning. Each problem is one of friction alone: what parts in its solution has no
+    strength in the next one, until no other parts. Pairs that slip on less than they would have are given back what
+    they lost, once. compliance: see find_compliance. None where a problem has no solution, leaves a body free, or the
+    subset's effort is spent.
+    """
+    whole, back = pose(subset, response), np.zeros_like(lost)
+    loses = find_losing(subset, whole)
+    if compliance is None:
+        compliance, _ = find_compliance(whole)
+    while compliance is not None and not subset.effort.is_spent:
+        problem = pose(replace(subset, memory=subset.memory.lose(subset.memory.broken | lost)), response)
+        modes = pivot_pairs(problem, compliance, np.zeros_like(lost), subset.modes)
+        if modes is None or not holds(modes):
+            return None
+        subset = replace(subset, modes=modes)
+        parted, weak = loses & (modes.mode == OPEN) & ~lost, find_weak(modes, lost)
+        if parted.any():
+            lost = lost | parted
+        elif weak.any() and not (weak & back).any():
+            lost, back = lost & ~weak, back | weak
+        else:
+            return modes, lost
+    return None
+
+
+def find_weak(modes: ModeState, lost: Bool) -> Bool:
+    """The pairs (s,) that slip on less than they would have, as they have lost some in the same step."""
+    return lost & (modes.mode == SLIP)
+
+
 def _release(
     subset: Subset, response: Response, compliance: Real, loses: Bool,
     judge: Callable[[ModeState, PairState], Proposal], holds: Callable[[ModeState], bool],
 ) -> ModeState | None:
-    """Modes where pairs lose what they can lose as they part, one after the other; None where they slip without it.
-
-    Whatever parts in the solution of a problem has no cohesion in the next one, but still touches where it has to. Each
-    problem is one of friction alone. Pairs that slip on less than they would have are given back what they lost, once.
-    """
+    """Modes where pairs lose what they can lose as they part, one after the other; None where they slip without it."""
     if not loses.any() or len(loses) > MOST_RELEASED:
         return None
-    whole, nothing = pose(subset, response), np.zeros(len(loses), dtype=bool)
-    for lost in (nothing, loses & (subset.modes.mode == OPEN)):
-        back = nothing
-        while not subset.effort.is_spent:
-            broken = subset.memory.broken | lost
-            modes = pivot_pairs(
-                pose(replace(subset, memory=subset.memory.lose(broken)), response), compliance, nothing
-            )
-            if modes is None or not holds(modes):
-                break
-            parted = loses & (modes.mode == OPEN) & ~lost
-            if parted.any():
-                lost = lost | parted
-                continue
-            weak = lost & (modes.mode == SLIP)
-            if not weak.any():
-                d = solve_in_modes(whole, modes)
-                if d is not None and not judge(modes, response.evaluate(d)).changed.any():
-                    return modes
-                break
-            if (weak & back).any():
-                break
-            lost, back = lost & ~weak, back | weak
+    whole = pose(subset, response)
+    for lost in (np.zeros_like(loses), loses & (subset.modes.mode == OPEN)):
+        settled = part_for_good(subset, response, lost, compliance, holds)
+        if settled is None or find_weak(*settled).any():
+            continue
+        d = solve_in_modes(whole, settled[0])
+        if d is not None and not judge(settled[0], response.evaluate(d)).changed.any():
+            return settled[0]
     return None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pbem.contact.pivoting import Pivoted, solve_by_pivoting
+from pbem.contact.pivoting import Pivoted, pivot_from, solve_by_pivoting
 
 Real = NDArray[np.float64]
 
@@ -93,3 +93,26 @@ def test_other_units_take_the_same_pivots() -> None:
         other = solve_by_pivoting(matrix, factor * constant)
         assert other.pivots == usual.pivots
         np.testing.assert_array_equal(other.z, factor * usual.z)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_any_basis_leads_to_the_same_solution_and_one_that_is_near_by_no_more_pivots(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    count = 24
+    root, skew = random.normal(size=(2, count, count))
+    matrix, constant = root @ root.T + 0.1 * np.eye(count) + skew - skew.T, random.normal(size=count)
+    whole = expect_solution(matrix, constant)
+    near = whole.basic.copy()
+    near[seed] = not near[seed]
+    for start, most in ((whole.basic, 0), (near, whole.pivots), (random.random(count) < 0.5, 20 * count)):
+        found = pivot_from(matrix, constant, start)
+        assert found.ended == "solution" and found.pivots <= most
+        np.testing.assert_allclose(found.z, whole.z, atol=1e-9)
+        np.testing.assert_array_equal(found.basic, whole.basic)
+
+
+def test_a_singular_basis_is_left_out() -> None:
+    matrix, constant = np.array([[0.0, 1.0], [-1.0, 0.0]]), np.array([-1.0, 2.0])
+    found = pivot_from(matrix, constant, np.array([True, False]))
+    np.testing.assert_allclose(found.z, solve_by_pivoting(matrix, constant).z)
+    np.testing.assert_allclose(found.z, [2.0, 1.0])  # w_1 = z_2 - 1, w_2 = 2 - z_1: both z, or neither

@@ -206,3 +206,13 @@ def test_smooth_discs_that_nothing_moves_do_not_move_on(tmp_path: Path) -> None:
     record = run_sample(94169, 0, tmp_path, tuple(KINDS))
     assert record.status == "settled"
     assert not record.faults
+
+
+@pytest.mark.parametrize("variant", [0, 1])
+def test_a_wall_near_its_largest_load_ends_with_what_moves_on(variant: int, tmp_path: Path) -> None:
+    """A tilted wall whose joints lose cohesion where they part: rigid blocks have no balance at loads that are larger
+    by a quarter. In other units, too."""
+    record = run_sample(120080, variant, tmp_path, tuple(KINDS))
+    assert (record.status, record.verdict) == ("limit load", "near")
+    assert "move on and come to no rest" in record.detail
+    assert record.halved <= 6 and max(record.iterations) <= 8

@@ -92,12 +92,19 @@ def test_strength_that_comes_back_is_settled_by_softer_contacts(variant: int, tm
 
 
 @pytest.mark.parametrize("damps", [True, False])
-def test_softer_contacts_are_tried_where_pivoting_finds_no_modes(damps: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Unless dashpots have told where the contact comes to rest."""
+@pytest.mark.parametrize("hurried", [True, False])
+def test_softer_contacts_are_tried_where_dashpots_cannot_tell_of_pairs_without_modes(
+    damps: bool, hurried: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dashpots where they can look for a state of rest, unless they have; softer contacts for want of them, if there is
+    time."""
     monkeypatch.setattr(softly_module, "can_be_damped", lambda problem, tangent: damps)
     model = parse_model(write_pushed_block(0.2, {"friction": 0.25, "cohesion": 0.01}))[1]
-    problem = assemble_problem(model, generate_mesh(model), world)
+    problem, listener = assemble_problem(model, generate_mesh(model), world), Listener()
     tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)
-    error = ConvergenceError("no admissible modes", "of these pairs")
-    found = solve_softly(problem, tangent, start_memory(problem.laws), load, Listener(), error)
-    assert isinstance(found, Solution) != damps
+    for restless in (False, True):
+        error = ConvergenceError("no admissible modes", "of these pairs", restless=restless)
+        found = solve_softly(problem, tangent, start_memory(problem.laws), load, listener, error, hurried=hurried)
+        assert isinstance(found, Solution) == (not restless if damps else not hurried)
+    told = "damping" if damps else "compliance"
+    assert any(f"{told} of the contacts" in note for note in listener.notes) == (damps or not hurried)

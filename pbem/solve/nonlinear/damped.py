@@ -93,4 +93,5 @@ def rest_late(problem: Problem, tangent: TangentOperator, memory: Memory, load: 
     damped = find_damped(problem, tangent, memory, load)
     if damped and damped.runs:
         search.collapse = describe_run(problem, memory, load, damped.runs).detail
+    search.restless = damped is None or not (damped.rest or damped.runs)
     return damped.rest if damped else None

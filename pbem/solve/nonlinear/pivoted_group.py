@@ -43,7 +43,9 @@ def end_search(hold: Hold, reason: str, modes: ModeState, proposal: Proposal, se
         hold.doubt_free_motion(proposal.modes, error)
         return hold.describe_floating(proposal.modes) or error
 
-    return hold.problem.decide(describe)
+    error = hold.problem.decide(describe)
+    error.restless = search.restless
+    return error
 
 
 def pivot_group(

@@ -139,6 +139,7 @@ class Search:
         self.pause = self.paused = 0
         self.widened, self.widening, self.narrow = 0, False, self.group
         self.collapse = ""  # what moves on, where contacts do not come to rest against dashpots
+        self.restless = False  # whether they were asked, and neither that nor a state of rest was found
         self.level = 0
         self.sweeping = self.sweeps
         self.returned = self.just_returned = False

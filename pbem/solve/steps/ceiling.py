@@ -72,10 +72,11 @@ class Ceiling:
     def lower(self, target: float, balanced: float, error: ConvergenceError) -> Ceiling:
         """With a try that failed; balanced: up to the target, which it is if all of it may be in balance.
 
-        Where it had been found free and fails for another reason from nearer, it is not known to be free any more.
+        Where it had been found free and fails for another reason from nearer, it is not known to be free any more. What
+        fails below it for another reason says nothing of that.
         """
         collapsed = error.reason == "free motion" or (error.reason == "limit load" and balanced >= target)
-        free = self.free if self.free < target else np.inf
+        free = self.free if self.free != target else np.inf
         return Ceiling(
             min(self.failed, target), min(free, target if collapsed else np.inf),
             min(self.balanced, balanced if balanced < target else np.inf), target, error,

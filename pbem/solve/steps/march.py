@@ -203,13 +203,14 @@ def _advance(
             slides = np.inf
             if balanced >= target and error.reason in (*UNSETTLED, "limit load") and not proportional():
                 slides = find_sliding(problem, memory, course.former, stage, reached, 1.0)
-            if balanced >= target and not hurried and slides > target:
+            if balanced >= target and slides > target:
                 softly = attempt.find_phase("softly")
                 with (
                     attempt.note_try(stage, reached, memory.modes, kind),
                     attempt.note_phase("softly", error=describe_error(error)),
                 ):
-                    found = solve_softly(problem, tangent, begin, load, reporter, error, softly and softly["inner"])
+                    found = solve_softly(
+                        problem, tangent, begin, load, reporter, error, softly and softly["inner"], hurried)
                 if isinstance(found, Solution):
                     return found, target, ceiling.pass_by(target)
                 error = found or error

@@ -28,24 +28,24 @@ UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh")
 
 def solve_softly(
     problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Supervisor,
-    error: ConvergenceError, resumed: Plain | None = None,
+    error: ConvergenceError, resumed: Plain | None = None, hurried: bool = False,
 ) -> Solution | ConvergenceError | None:
     """A load step whose search has ended with an error, by statuses of other contacts; None if these do not settle.
 
     At first by those of contacts that come to rest against dashpots (see pbem.contact.damped), then by those of softer
     contacts. The solution is one of the true laws, found by their own search. Its iterations are those of all contacts.
     A truer error where the bodies do not come to rest. None, too, for crack networks and large models, whose groups
-    settle by themselves, for laws that are not linear in each status, and for other errors. resumed: see solve_step.
+    settle by themselves, for laws that are not linear in each status, and for other errors. hurried: whether softer
+    contacts are left out, as they are where pairs have no admissible modes among which dashpots can look for a state
+    of rest. resumed: see solve_step.
     """
-    damps = can_be_damped(problem, tangent)
-    # Of few pairs dashpots have told by then where they come to rest.
-    unsettled = error.reason in UNSETTLED or (error.reason == "no admissible modes" and not damps)
-    unsettled = unsettled or error.unless is not None or resumed is not None
+    damps, parts = can_be_damped(problem, tangent), error.reason == "no admissible modes"
+    unsettled = error.reason in UNSETTLED or parts or error.unless is not None or resumed is not None
     if not unsettled or tangent.settling.nearby or not find_linear(problem.laws).all():
         return None
     contacts = (*(soften(problem, softness) for softness in SOFTNESS), problem)
     damped = resumed if resumed and resumed["damped"] else None
-    if not resumed and damps:
+    if not resumed and damps and not error.restless:
         rest = find_damped(problem, tangent, begin, load)
         if rest and rest.runs:
             return describe_run(problem, begin, load, rest.runs)
@@ -53,6 +53,8 @@ def solve_softly(
             damped = {"contact": len(SOFTNESS), "modes": to_plain(rest.rest.modes), "iterations": to_plain([]),
                       "inner": None, "damped": True}
     found = _follow(problem, tangent, contacts, begin, load, reporter, damped) if damped else None
+    if hurried or (parts and damps):
+        return found
     return found or _follow(problem, tangent, contacts, begin, load, reporter, None if damped else resumed)
 
 

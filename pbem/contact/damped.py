@@ -38,7 +38,8 @@ MOST_SOLVED, OF_PAIRS, MOST_TAKEN = 1000, 100, 100
 # Newton's steps of an instant before it is pivoted: those that lead to its modes are few.
 MOST_STEPS = 25
 # Instants in turn in which faces lack the strength that they lost in them: what follows leads to no equilibrium either.
-MOST_PARTED = 3
+# And problems of one such instant, where friction changes with slip.
+MOST_PARTED, MOST_LACKING = 3, 10
 # Operations that they may take, all together.
 MOST_EFFORT = 5e10
 
@@ -148,7 +149,7 @@ def _solve_instant(
             found = step_subset(problem, subset.modes, damped, judge, most=MOST_STEPS, shares=(0.0,))
         if found is None:
             parted = part_for_good(before, damped, find_losing(before, problem) & (before.modes.mode == OPEN))
-            if parted is None:
+            if parted is None or (lost.any() and taken > MOST_LACKING):
                 return None
             found, lost = parted
             subset = replace(before, memory=before.memory.lose(before.memory.broken | lost))
@@ -157,6 +158,8 @@ def _solve_instant(
         if d is None:
             return None
         stays = not judge(found, damped.evaluate(d)).changed.any()
+        if not stays and not lost.any():  # friction alone has modes: what is refused of them is ill-conditioned
+            return None
         before, subset, response = replace(before, modes=found), replace(subset, modes=found), _move(response, d)
         if _fulfils(subset, _damp(response, stiffness, jumps)):
             return found, response, left - taken, stays and not find_weak(found, lost).any()

@@ -90,12 +90,13 @@ def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState
     """What concerns some pairs (s,), some of them more than once, each of which takes a mode of its own."""
     groups = []
     for group in laws.strengths:
-        place = np.full(laws.count, -1)
-        place[group.pairs] = np.arange(len(group.pairs))
-        inside = np.flatnonzero(place[pairs] >= 0)
+        if not len(group.pairs):
+            continue
+        place = np.minimum(np.searchsorted(group.pairs, pairs), len(group.pairs) - 1)  # they rise
+        inside = np.flatnonzero(group.pairs[place] == pairs)
         if not len(inside):  # laws of one's own are not asked about no pairs
             continue
-        taken = place[pairs[inside]]
+        taken = place[inside]
         parameters = {name: values[taken] for name, values in group.parameters.items()}
         groups.append(replace(group, pairs=inside, parameters=parameters))
     arrays = {name: getattr(laws, name)[pairs] for name in vars(laws) if name not in ("strengths", "leader")}

@@ -214,3 +214,8 @@ class FrictionLaw(ABC):
         """Whether the dissipated energy is the integral of the bound; else the mean of the tractions at the ends of the
         step, times the slip."""
         return not self.creeps
+
+
+def take_values(internal: Mapping[str, NDArray[Any]], pairs: Integer) -> dict[str, NDArray[Any]]:
+    """The internal variables of some pairs."""
+    return {name: values[pairs] for name, values in internal.items()}

@@ -25,6 +25,7 @@ from pbem.contact.declaration import (
     Slide,
     StepEnd,
     list_variables,
+    take_values,
 )
 from pbem.contact.friction_bound import Strength
 from pbem.contact.leaders import find_leaders
@@ -125,6 +126,10 @@ class PairState:
     def bear(self, carried: Real) -> PairState:
         """With tractions (m, 2) along n and s besides those of the laws."""
         return replace(self, p_n=self.p_n + carried[:, 0], p_s=self.p_s + carried[:, 1])
+
+    def take(self, pairs: Integer) -> PairState:
+        """The state of some pairs (k,)."""
+        return PairState(*(values[pairs] for values in vars(self).values()))
 
     def approach(self, other: PairState, part: float) -> PairState:
         """The state at a part of the way to another one."""
@@ -262,11 +267,6 @@ def spread_values(values: Sequence[Value], owner: Integer, places: Places) -> Re
 def find_effective(laws: PairLaws, p_n: Real, pressure: Real) -> Real:
     """Normal tractions (m,) less the pressure of the fluid that is inside of closed parts."""
     return np.asarray(p_n + np.where(laws.fluid_inside, pressure, 0.0))
-
-
-def take_values(internal: Mapping[str, NDArray[Any]], pairs: Integer) -> dict[str, NDArray[Any]]:
-    """The internal variables of some pairs."""
-    return {name: values[pairs] for name, values in internal.items()}
 
 
 def evaluate_strength(laws: PairLaws, p_n: Real, slide: Slide, pressure: Real) -> Strength:

@@ -49,10 +49,22 @@ class Linearisation:
     leader: Integer
     smoothed: bool = False
 
+    def take(self, pairs: Integer) -> Linearisation:
+        """The laws of some pairs (k,), each by itself."""
+        return Linearisation(self.tangent[pairs], self.offset[pairs], np.arange(len(pairs)), self.smoothed)
+
+    def store(self) -> Linearisation:
+        """The laws as arrays of all pairs (see pbem.contact.deferred_laws)."""
+        return self
+
+    def apply(self, unknowns: Real) -> Real:
+        """States (m, 4) of the pairs, each by its own law, from their unknowns (m, 2)."""
+        result: Real = np.einsum("mij,mj->mi", self.tangent, unknowns) + self.offset
+        return result
+
     def evaluate(self, unknowns: Real) -> PairState:
         """State of the pairs from their unknowns (m, 2)."""
-        state = np.einsum("mij,mj->mi", self.tangent, unknowns) + self.offset
-        return PairState(*state[self.leader].T)
+        return PairState(*self.apply(unknowns)[self.leader].T)
 
 
 def linearise(

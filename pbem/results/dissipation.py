@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Real
 from pbem.contact.closure import find_closure, measure_stiffening
-from pbem.contact.declaration import BROKEN, SLIP_PATH, Passage, Slide
+from pbem.contact.declaration import BROKEN, SLIP_PATH, Passage, Slide, take_values
 from pbem.contact.laws import (
     OPEN,
     SLIP,
@@ -20,7 +20,6 @@ from pbem.contact.laws import (
     evaluate_strength,
     find_effective,
     start_memory,
-    take_values,
 )
 from pbem.solve.problem.step import ContactState
 

@@ -98,8 +98,9 @@ def test_the_text_of_a_law_is_stored_and_compared(folder: Path) -> None:
     np.testing.assert_allclose(whole.traction, pbem.run(coulomb, folder / "coulomb.h5").traction, rtol=0, atol=1e-9)
 
 
-def test_a_law_that_is_right_runs_on_two_ranks(folder: Path) -> None:
-    done = launch(2, "run", "case.toml", "--quiet", cwd=folder)
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+def test_a_law_that_is_right_runs_on_two_ranks(operator: str, folder: Path) -> None:
+    done = launch(2, "run", "case.toml", "--quiet", "--set", f"solver.operator={operator}", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert open_results(folder / "case.h5").status == "finished"
 

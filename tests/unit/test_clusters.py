@@ -144,18 +144,18 @@ def test_the_stiffness_is_that_of_the_whole_model(many_groups: None, text: str) 
     law = linearise_pairs(problem, draw_modes(problem.mesh.pairs.count), -1.0)
     constraints = problem.constrain(law, load)
     solved = tangent.solve(constraints, load, law)
-    sweeps = Sweeps(problem, tangent.preconditioner, problem.system.groups, load)
+    sweeps = Sweeps(problem, tangent.preconditioner, tangent.product, problem.system.groups, load)
     clusters = tangent.find_clusters(load)
     assert clusters is not None
     jumps = stack_states(evaluate_pairs(problem.mesh, law, solved.unknowns))[:, 2:]
-    before = sweeps.find_tractions(constraints, load, solved, jumps)
+    before = sweeps.find_tractions(load, solved, jumps)
     random, seen = np.random.default_rng(3), []
 
     def compare(pairs: NDArray[np.int64], stiffness: Real) -> None:
         # What the jumps of these pairs alone change of their tractions, by a product of the whole.
         change = np.zeros_like(jumps)
         change[pairs] = random.normal(size=(len(pairs), 2)) * np.abs(jumps).max()
-        moved = (sweeps.find_tractions(constraints, load, solved, jumps + change) - before)[pairs]
+        moved = (sweeps.find_tractions(load, solved, jumps + change) - before)[pairs]
         found = (stiffness @ change[pairs].ravel()).reshape(-1, 2)
         np.testing.assert_allclose(found, moved, rtol=0, atol=1e-6 * np.abs(moved).max())
         seen.append(len(pairs))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.operator import assemble_rows
 from pbem.case.build import parse_model
-from pbem.contact.constraints import build_constraints, evaluate_pairs
+from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.loads import collect_outer_nodes, evaluate_load, find_needed_columns
 from pbem.mesh.generate import generate_mesh
@@ -213,7 +213,7 @@ def test_nodes_of_a_region_that_is_gone_disturb_no_other(problem: Problem, side:
     carried = np.where(joint[:, None], random.normal(size=(pairs.count, 2)), 0.0)
     load = replace(problem.evaluate_load(0, 1.0), carried=carried)
     law = linearise_pairs(problem, modes, factor=1.0)
-    made = build_constraints(mesh, problem.outer, problem.laws.gap, law, load, problem.traction_scale, gone)
+    made = ConstraintMap(mesh, problem.outer, problem.laws.gap, law, load, problem.traction_scale, gone)
     x = random.normal(size=problem.unknowns)
     u, t = split(mesh, made.evaluate(x))
     own = x.reshape(-1, 2)[gone] @ [1, 1j]

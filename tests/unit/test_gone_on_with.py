@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import sparse
 
 import pbem
-from pbem.contact.constraints import ConstraintMap
 from pbem.solve.preconditioner import schwarz
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.step import Iteration, SilentReporter
@@ -72,17 +70,3 @@ def test_an_operator_that_stays_is_solved_by_what_is_known(small_groups: None, t
         for field in ("traction_n", "traction_s"):
             expected, value = getattr(contact, field)[-1], getattr(found.contact[name], field)[-1]
             np.testing.assert_allclose(value, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-
-
-def test_operators_are_the_same_with_the_same_columns_and_anchors() -> None:
-    matrix = sparse.csr_matrix(np.array([[1.0, 0.0], [2.0, 3.0]]))
-    other = matrix.copy()
-    other.data[1] = np.nextafter(2.0, 3.0)
-    offset, free = np.zeros(2), np.array([[1.0], [0.0]])
-    plain = ConstraintMap(matrix, offset)
-    assert plain.acts_as(ConstraintMap(matrix.copy(), offset + 1))
-    assert not plain.acts_as(ConstraintMap(other, offset))
-    assert ConstraintMap(matrix, offset, free).acts_as(ConstraintMap(matrix, offset, free.copy()))
-    for released in (None, free[::-1], np.eye(2)):
-        assert not ConstraintMap(matrix, offset, free).acts_as(ConstraintMap(matrix, offset, released))
-        assert not ConstraintMap(matrix, offset, released).acts_as(ConstraintMap(matrix, offset, free))

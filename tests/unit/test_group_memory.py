@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pbem.contact.constraints import build_constraints
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.numbering import list_nodes, number_components
@@ -38,10 +38,10 @@ def test_of_a_group_only_the_rows_that_are_wanted_are_held() -> None:
     mesh = generate_mesh(model)
     outer, gap = collect_outer_nodes(model, mesh), np.zeros(mesh.pairs.count)
     load = evaluate_load(model, mesh, outer, 0, 1.0)
-    matrix = build_constraints(mesh, outer, gap, draw(model, mesh, 1), load, SCALE).matrix
+    constraints = ConstraintMap(mesh, outer, gap, draw(model, mesh, 1), load, SCALE)
     local = LocalOperator(mesh, [region.material for region in model.regions], 1.0, ())
     nodes, elements = np.arange(mesh.nodes), np.arange(mesh.elements)
-    near = take_near(matrix, local.collect_free(nodes), nodes)
+    near = take_near(constraints, local.collect_free(nodes), nodes)
     blocks = near.take_blocks()
     less = eliminate_tractions(near, blocks, mesh.node_crack, np.abs(blocks).max())
     around = number_components(list_nodes(mesh, elements))

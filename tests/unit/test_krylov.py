@@ -311,7 +311,7 @@ def test_pairs_are_asked_for_responses_after_the_groups_took_in_more(
         assert tangent.widening == (1 if most else krylov.WIDENING)
         problem, load, constraints = tangent.problem, tangent.problem.evaluate_load(0, 1.0), tangent.constraints
         assert constraints is not None and tangent.solution is not None
-        solved = Solved(tangent.solution, constraints.evaluate(tangent.solution), 0.0)
+        solved = Solved(tangent.solution, 0.0)
         pairs = np.array([1, problem.laws.count - 2])
         given = (constraints, load, linearise_pairs(problem), solved, pairs)
         responses.append(find_response(problem, tangent, *given).change)

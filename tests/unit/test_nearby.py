@@ -121,16 +121,16 @@ def test_pairs_in_any_order_have_the_same_answers(many_groups: None) -> None:
     pairs = np.arange(20, 30)
     spread = np.zeros_like(law.tangent)
     spread[pairs] = complete_states(law.tangent[pairs], problem.traction_scale)
-    offsets = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
+    offsets = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load)
     nodes = problem.mesh.pairs.slave[pairs]
     elements = np.unique(problem.mesh.node_element[nodes])
     others = np.random.default_rng(2).permutation(len(nodes))
     place = number_components(others)
-    near = tangent.preconditioner.take_near(constraints.matrix, list_nodes(problem.mesh, elements))
+    near = tangent.preconditioner.take_near(constraints, list_nodes(problem.mesh, elements))
 
     def ask(own: Integer) -> tuple[Real, Real]:
         preconditioner = tangent.preconditioner
-        return (preconditioner.respond(constraints.matrix, offsets, elements, number_components(own)),
+        return (preconditioner.respond(constraints, offsets, elements, number_components(own)),
                 preconditioner.form_block(near, elements, own))
 
     for found, expected in zip(ask(nodes[others]), ask(nodes), strict=True):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from pbem.contact.constraints import ConstraintMap, build_constraints
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -29,7 +29,7 @@ class Shares:
         self.mesh: Mesh = generate_mesh(model)
         outer, gap = collect_outer_nodes(model, self.mesh), np.zeros(self.mesh.pairs.count)
         load = evaluate_load(model, self.mesh, outer, 0, 1.0)
-        self.map: ConstraintMap = build_constraints(self.mesh, outer, gap, draw(model, self.mesh, 1), load, SCALE)
+        self.map: ConstraintMap = ConstraintMap(self.mesh, outer, gap, draw(model, self.mesh, 1), load, SCALE)
         self.materials = [region.material for region in model.regions]
         self.groups = divide_model(self.mesh)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbem.contact.deferred_laws import defer_smoothed
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip, start_memory
 from pbem.contact.modes import Linearisation, linearise
 from pbem.contact.smoothed import (
@@ -323,9 +324,9 @@ def record_widths(monkeypatch: pytest.MonkeyPatch) -> list[Real]:
 
     def record(*arguments: Any) -> Linearisation:
         widths.append(arguments[6])
-        return linearise_smoothly(*arguments)
+        return defer_smoothed(*arguments)
 
-    monkeypatch.setattr(smooth_search, "linearise_smoothly", record)
+    monkeypatch.setattr(smooth_search, "defer_smoothed", record)
     return widths
 
 

@@ -88,10 +88,10 @@ def test_tractions_are_those_of_the_solution_and_of_the_stiffness(many_groups: N
     constraints = problem.constrain(law_now, load)
     solved = tangent.solve(constraints, load, law_now)
     state = evaluate_pairs(problem.mesh, law_now, solved.unknowns)
-    found = Sweeps(problem, tangent.preconditioner, problem.system.groups, load)
+    found = Sweeps(problem, tangent.preconditioner, tangent.product, problem.system.groups, load)
     jumps = np.column_stack([state.g_n, state.g_s])
     exact = np.column_stack([state.p_n, state.p_s]) / problem.traction_scale
-    tractions = found.find_tractions(constraints, load, solved, jumps)
+    tractions = found.find_tractions(load, solved, jumps)
     np.testing.assert_allclose(tractions, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
     # Of all groups: what the jumps of their pairs alone change.
     random = np.random.default_rng(1)
@@ -99,7 +99,7 @@ def test_tractions_are_those_of_the_solution_and_of_the_stiffness(many_groups: N
         pairs = found.parts.pairs[found.parts.first[k] : found.parts.first[k + 1]]
         change = np.zeros_like(jumps)
         change[pairs] = random.normal(size=(len(pairs), 2)) * np.abs(jumps).max()
-        moved = (found.find_tractions(constraints, load, solved, jumps + change) - tractions)[pairs]
+        moved = (found.find_tractions(load, solved, jumps + change) - tractions)[pairs]
         stiff = (found.parts.stiffness[k] @ change[pairs].ravel()).reshape(-1, 2)
         np.testing.assert_allclose(stiff, moved, rtol=0, atol=1e-4 * np.abs(moved).max())
     tangent.destroy()

@@ -144,7 +144,8 @@ class SecondSolution:
                 raise ConvergenceError(
                     "iteration limit", f"the laws of faces that creep are off by {error:.1e} of the tractions")
         pairs, residual = pairs.bear(load.carried), solved.residual
-        return Solution(solved.unknowns, solved.v, pairs, modes, memory, residual, (), load.pressure)
+        v = self.tangent.evaluate(solved, constraints)
+        return Solution(solved.unknowns, v, pairs, modes, memory, residual, (), load.pressure)
 
     def _carry_internal(self, contact: ContactState) -> dict[str, NDArray[Any]]:
         """The internal variables of the run's pairs, carried over as they are declared to be."""

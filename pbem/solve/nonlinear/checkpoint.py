@@ -119,6 +119,7 @@ class Checkpoint:
 
 def to_plain(value: Any) -> Any:
     """Dictionaries, lists and leaves for a value, from which `from_plain` makes it again. Raises TypeError."""
+    value = value.store() if isinstance(value, Linearisation) else value
     if is_dataclass(value) and type(value).__name__ in KINDS:
         return {KIND: type(value).__name__, **{each.name: to_plain(getattr(value, each.name))
                                                for each in fields(value)}}

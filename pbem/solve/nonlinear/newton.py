@@ -11,9 +11,10 @@ import numpy as np
 from pbem.arrays import Real
 from pbem.contact.closure import choose_traction
 from pbem.contact.constraints import ConstraintMap
+from pbem.contact.deferred_laws import defer_laws
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
-from pbem.contact.modes import Frozen, Linearisation, choose_slip, limit_changes, linearise
+from pbem.contact.modes import Frozen, Linearisation, choose_slip, limit_changes
 from pbem.contact.running import Rest
 from pbem.contact.seat import find_seat
 from pbem.contact.separating import choose_bond_slip, choose_jump
@@ -221,7 +222,7 @@ class _Run:
     def _iterate(self) -> _Iterated | None:
         """Solve with the laws as they are in the present modes; None where that is begun anew with stiffer blocks."""
         problem, load, search, forcing = self.problem, self.load, self.search, self.forcing
-        law = self.blocks.stiffen(linearise(
+        law = self.blocks.stiffen(defer_laws(
             self.laws, self.modes, self.normal_traction, self.slip, self.memory, load.pressure, problem.traction_scale,
             search.globalisation.frozen, self.jump,
         ), self.modes)
@@ -273,7 +274,8 @@ class _Run:
         outcome, solved, hold, load = found.outcome, found.solved, self.hold, self.load
         if not outcome.settled or cascade:
             return None
-        if hold.is_driven(self.modes, solved.v, load):
+        v = self.tangent.evaluate(solved, found.constraints)
+        if hold.is_driven(self.modes, v, load):
             self.search.restart()
             return None
         if not outcome.rests:
@@ -283,7 +285,7 @@ class _Run:
         for note in hold.describe(self.modes) if self.problem.comm.rank == 0 else ():
             self.reporter.note(note)
         whole = outcome.pairs.bear(load.carried)
-        return Solution(solved.unknowns, solved.v, whole, self.modes, self.memory, solved.residual,
+        return Solution(solved.unknowns, v, whole, self.modes, self.memory, solved.residual,
                         tuple(self.iterations), load.pressure)
 
     def _ask_for_balance(self, found: _Iterated, cascade: Cascade | None) -> None:

@@ -20,10 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.arrays import Bool, Real
+from pbem.contact.deferred_laws import defer_stiffness
 from pbem.contact.laws import OPEN, ModeState, PairState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
-from pbem.contact.smoothed import stiffen_jumps
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.blocks import measure_drive, measure_usual
 from pbem.solve.problem.problem import Problem
@@ -105,7 +105,7 @@ class OpenBlocks:
         if self.state is None:
             return law
         self._stiffness = self._problem.decide(lambda: self._choose_stiffness(modes))
-        return stiffen_jumps(law, self.state, self._stiffness.values)
+        return defer_stiffness(law, self.state, self._stiffness.values)
 
     def _choose_stiffness(self, modes: ModeState) -> _Stiffness:
         moving = {body for motion in self._problem.find_cut_motions(modes) for body in motion.moving}

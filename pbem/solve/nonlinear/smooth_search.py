@@ -24,12 +24,12 @@ import numpy as np
 from pbem.arrays import Integer, Real
 from pbem.contact.cluster_laws import FARTHEST, PROXIMAL
 from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.deferred_laws import defer_smoothed
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
 from pbem.contact.smoothed import (
     close_smoothed,
     find_smooth,
-    linearise_smoothly,
     measure_violation,
     read_modes,
     take_off_proximal,
@@ -192,7 +192,7 @@ class SmoothSearch:
             if not 0 < width.value < np.inf:
                 break
             begin = time.perf_counter()
-            law = linearise_smoothly(
+            law = defer_smoothed(
                 problem.laws, self.smooth, state, memory, load.pressure, problem.traction_scale,
                 width.value * self._shape, proximal, width.aim,
             )

@@ -20,6 +20,7 @@ from pbem.bem.rigid_motions import RigidMotions
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap
+from pbem.contact.map_entries import ChosenNodes
 from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components
@@ -65,18 +66,24 @@ class BodyFactors:
         self._first = sum(comm.allgather(2 * len(nodes))[: comm.rank])
         self._solver = LinearSolver(comm, "mumps", 2 * len(nodes), len(order), lambda part: part, OWN_PREFIX)
         self._blocks = [_make_block(mesh, local, nodes, int(region)) for region in np.unique(mesh.node_region[nodes])]
+        # The nodes whose rows of constraint maps are asked for: of these regions.
+        self._seen = np.unique(np.concatenate([nodes, *(block.seen for block in self._blocks)]))
+        self._place_entries = ChosenNodes(mesh.nodes, self._seen).place_entries
 
-    def factorise(self, constraints: sparse.csr_matrix) -> bool:
-        """Factorise K = B M for a constraint map M, with the anchors that act with it (theory, 119).
+    def factorise(self, constraints: ConstraintMap) -> bool:
+        """Factorise K = B M for a constraint map, with the anchors that act with it (theory, 119).
 
         Returns on all ranks alike whether there are factors: not of a singular K, without memory for them, or where
         the user's options put something else in their place. Too little memory to form K, which one rank can lack
         alone, is raised.
         """
-        free = (self._local.collect_free(self._nodes) @ constraints).tocsr()
+        rows, free = constraints.take_rows(self._seen), self._local.collect_free(self._nodes)
+        places = (free.data, self._place_entries(free.indices), free.indptr)
+        freed = (sparse.csr_matrix(places, shape=(free.shape[0], rows.shape[0])) @ rows).tocsr()
         begin, end = self._first, self._first + 2 * len(self._nodes)
         entries = [
-            (take_entries(constraints, block.columns), take_entries(free, block.rows)) for block in self._blocks
+            (take_entries(rows, self._place_entries(block.columns)), take_entries(freed, block.rows))
+            for block in self._blocks
         ]
         seen = [np.unique(self._place[np.concatenate([each[1] for each in pair])]) for pair in entries]
         inside, outside = np.zeros((2, end - begin), dtype=np.int64)
@@ -84,9 +91,9 @@ class BodyFactors:
             here = np.count_nonzero((places >= begin) & (places < end))
             inside[block.rows], outside[block.rows] = here, len(places) - here
         self._solver.begin_filling((inside, outside))
-        for block, places, (moved, freed) in zip(self._blocks, seen, entries, strict=True):
+        for block, places, (moved, own) in zip(self._blocks, seen, entries, strict=True):
             values = self._form(block, places, moved)
-            row, unknown, value = freed
+            row, unknown, value = own
             values[row, np.searchsorted(places, self._place[unknown])] += value
             self._solver.fill(block.rows, places, values)
         try:
@@ -140,7 +147,7 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         if self._count_own(self._drift > self.most_drift) <= FEW_CHANGED:
             return 0
         with clock.piece("preconditioner"):
-            factored = self._factors.factorise(constraints.matrix)
+            factored = self._factors.factorise(constraints)
         if not factored:
             self._drop()
             return super().update(constraints)

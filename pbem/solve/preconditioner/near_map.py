@@ -8,7 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Integer, Real
-from pbem.mesh.numbering import number_components
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.map_entries import ChosenNodes
 from pbem.solve.system.halo import place_unknowns
 
 
@@ -56,21 +57,18 @@ class NearMap:
 
 
 def take_near(
-    matrix: sparse.csr_matrix, free: sparse.csr_matrix, own: Integer, beyond: Integer | None = None
+    constraints: ConstraintMap, free: sparse.csr_matrix, own: Integer, beyond: Integer | None = None
 ) -> NearMap:
-    """The map of nodes own, and of those beyond, from the whole one; free (2 h, 4 n): their free terms."""
+    """The map of nodes own, and of those beyond, from what is formed of it for them; free (2 h, 4 n): their free terms,
+    each in the node's own entries."""
     beyond = np.zeros(0, dtype=np.int64) if beyond is None else beyond
-    moved = (free @ matrix).tocsr()
-    if len(own) == matrix.shape[1] // 2:
-        return NearMap(own, beyond, matrix.tocsc(), moved)
+    if 4 * len(own) == free.shape[1]:
+        return NearMap(own, beyond, constraints.matrix.tocsc(), (free @ constraints.matrix).tocsr())
     nodes = np.concatenate([own, beyond])
-    place = np.full(matrix.shape[1], -1, dtype=matrix.indices.dtype)
-    place[number_components(nodes)] = np.arange(2 * len(nodes))
-    column = place[matrix.indices]
-    at = np.flatnonzero(column >= 0)
-    row = np.searchsorted(matrix.indptr, at, side="right") - 1
-    shape = (matrix.shape[0], 2 * len(nodes))
-    return NearMap(own, beyond, sparse.coo_matrix((matrix.data[at], (row, column[at])), shape=shape).tocsc(), moved)
+    rows = np.sort(nodes)
+    place = ChosenNodes(free.shape[1] // 4, rows).place_entries
+    near = sparse.csr_matrix((free.data, place(free.indices), free.indptr), shape=(free.shape[0], 4 * len(rows)))
+    return NearMap(own, beyond, constraints.take_columns(nodes), (near @ constraints.take_rows(rows)).tocsr())
 
 
 def _find_largest(columns: sparse.csc_matrix) -> Real:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy import sparse
 
 from pbem.arrays import Integer, Real
 from pbem.bem.group_sizes import MOST_LEFT_OF_BODIES, MOST_TIMES
@@ -142,7 +141,7 @@ class SchwarzPreconditioner:
         """Take another constraint map; by which part of itself each of its columns has changed, of the unknowns of the
         own nodes and of those beyond."""
         before, former = self._near if self._comparable else None, self._less
-        near = self._near = self.take_near(constraints.matrix, self._nodes, self.beyond)
+        near = self._near = self.take_near(constraints, self._nodes, self.beyond)
         change, self._comparable = near.measure_changes(before), True
         change[self._local.find_anchored(constraints, near.nodes)] = np.inf
         self._less = None
@@ -153,10 +152,10 @@ class SchwarzPreconditioner:
             change[((less.local != former.local) | (less.first != former.first)).ravel()] = np.inf
         return change
 
-    def take_near(self, matrix: sparse.csr_matrix, own: Integer, beyond: Integer | None = None) -> NearMap:
-        """What groups of nodes need of a constraint map (4 n, 2 n); nodes: see NearMap."""
+    def take_near(self, constraints: ConstraintMap, own: Integer, beyond: Integer | None = None) -> NearMap:
+        """What groups of nodes need of a constraint map; nodes: see NearMap."""
         free = self._local.collect_free(own if beyond is None else np.concatenate([own, beyond]))
-        return take_near(matrix, free, own, beyond)
+        return take_near(constraints, free, own, beyond)
 
     def _eliminate(self, near: NearMap, blocks: Real) -> Elimination:
         on_crack = self._mesh.crack[near.nodes // (self._mesh.order + 1)]
@@ -264,9 +263,9 @@ class SchwarzPreconditioner:
         self.singular += found > 0 or inverse.matrix is None
 
     def respond(
-        self, constraints: sparse.csr_matrix, offsets: sparse.csr_matrix, elements: Integer, unknowns: Integer
+        self, constraints: ConstraintMap, offsets: ConstraintMap, elements: Integer, unknowns: Integer
     ) -> Real:
-        """What columns of B times offsets (4 n, 2 n) do to the unknowns of the same numbers, (k, k), all else free.
+        """What columns of B times a map of offsets do to the unknowns of the same numbers, (k, k), all else free.
 
         Of the model the elements alone are there, the nodes of the unknowns among them; constraints: those of `update`.
         """
@@ -275,7 +274,7 @@ class SchwarzPreconditioner:
         asked = np.searchsorted(around, unknowns)
         at = np.sort(asked)  # pairs need not be in the order of their nodes
         # The elements can be those of other ranks.
-        near, moved = (self.take_near(matrix, nodes) for matrix in (constraints, offsets))
+        near, moved = (self.take_near(each, nodes) for each in (constraints, offsets))
         less = self._eliminate(near, near.take_blocks())
         local, first = less.local.ravel(), less.first.ravel()
         wanted = np.zeros(len(around), dtype=bool)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pbem.arrays import Real
-from pbem.contact.constraints import ConstraintMap, build_constraints
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import P_N, P_S, Linearisation
 from pbem.model.rigid_body_modes import RigidBodyMode
@@ -24,7 +24,7 @@ def collect_given(problem: Problem, load: Load) -> tuple[ConstraintMap, Real]:
     tangent = np.zeros((count, 4, 2))
     tangent[:, P_N, 0] = tangent[:, P_S, 1] = 1.0
     law = Linearisation(tangent, np.zeros((count, 4)), np.arange(count))
-    constraints = build_constraints(mesh, problem.outer, np.zeros(count), law, load, 1.0)
+    constraints = ConstraintMap(mesh, problem.outer, np.zeros(count), law, load, 1.0)
     return constraints, (constraints.offset - load.known)[2 * mesh.nodes :]
 
 

@@ -17,7 +17,7 @@ from pbem.bem.location import Location
 from pbem.contact.anchor import Anchor
 from pbem.contact.approach import approach_pairs
 from pbem.contact.arrangement import Arrangement
-from pbem.contact.constraints import ConstraintMap, build_constraints, build_offset
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.custom import asked_by_one_rank
 from pbem.contact.cut_parts import CutMotion, CutParts
 from pbem.contact.free_motions import FreeMotions, find_free_motions, find_ties
@@ -207,26 +207,22 @@ class Problem:
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
         """The constraint map for linearised laws and a load."""
-        return build_constraints(
-            self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale, self._gone_nodes)
-
-    def find_offset(self, law: Linearisation, load: Load) -> Real:
-        """The offset (4 nodes,) of the same constraint map, without its matrix."""
-        return build_offset(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale, self._gone_nodes)
-
-    @property
-    def _gone_nodes(self) -> Integer | None:
-        return None if self.arrangement is None else self.arrangement.nodes
+        gone = None if self.arrangement is None else self.arrangement.nodes
+        return ConstraintMap(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale, gone)
 
     def apply(self, v: Real, load: Load, released: Real | None = None) -> Real:
         """This rank's rows of the integral equations, less the part that comes from far away; lengths (theory, 15, 44).
 
         released (a, r): combinations of the anchors that do not act.
         """
+        result: Real = self.system.apply(v - load.known) - self.find_far(load)
+        return result - self.find_released(v - load.known, released)
+
+    def find_far(self, load: Load) -> Real:
+        """This rank's part of the equations that comes from far away; lengths (theory, 15)."""
         own = self.system.nodes
         far = np.where(self.mesh.traction_equation[own], load.far[1, own], load.far[0, own]) * self.equation_scale[own]
-        result: Real = self.system.apply(v - load.known) - np.stack([far.real, far.imag], axis=1).ravel()
-        return result - self.find_released(v - load.known, released)
+        return split_components(far)
 
     def find_released(self, v: Real, released: Real | None) -> Real | float:
         """This rank's rows of what released combinations (a, r) of the anchors add to B v."""

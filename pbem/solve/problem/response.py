@@ -7,6 +7,7 @@ import numpy as np
 from pbem.arrays import Integer, Real
 from pbem.contact.complementarity import Response
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
+from pbem.contact.deferred_laws import spread_directions
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.mesh.numbering import number_components
@@ -23,10 +24,11 @@ def find_response(
     A pair's state is q = T x + o in its present mode. With C the two columns that complete T to a basis of all states,
     q = T (x + dx) + o + C d, where K dx = -B E C d answers to the offsets d: two solutions for each pair.
     """
-    complement = complete_states(law.tangent[pairs], problem.traction_scale)
+    tangent_of_pairs = law.take(pairs).tangent
+    complement = complete_states(tangent_of_pairs, problem.traction_scale)
     effect = tangent.respond(constraints, load, law, pairs, complement)
     count = len(pairs)
-    change = np.einsum("mij,mjk->mik", law.tangent[pairs], effect.reshape(count, 2, 2 * count))
+    change = np.einsum("mij,mjk->mik", tangent_of_pairs, effect.reshape(count, 2, 2 * count))
     own = np.arange(count)
     for j in range(2):
         change[own, :, 2 * own + j] += complement[:, :, j]
@@ -48,9 +50,14 @@ def select_states(
     problem: Problem, load: Load, law: Linearisation, pairs: Integer, directions: Real
 ) -> tuple[Real, Integer]:
     """v (4 nodes, 2 s) of offsets of pairs (s,) along directions (s, 4, 2), and the pairs' own unknowns (2 s,)."""
-    spread = np.zeros_like(law.tangent)
-    spread[pairs] = directions
-    matrix = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
-    unknowns = number_components(problem.mesh.pairs.slave[pairs])
+    constraints, unknowns = spread_states(problem, load, law, pairs, directions)
     # The carriers' displacements are columns of their own: those of the pairs' unknowns are their states alone.
-    return matrix[:, unknowns].toarray(), unknowns
+    return constraints.matrix[:, unknowns].toarray(), unknowns
+
+
+def spread_states(
+    problem: Problem, load: Load, law: Linearisation, pairs: Integer, directions: Real
+) -> tuple[ConstraintMap, Integer]:
+    """The map of which the columns of the pairs' own unknowns (2 s,), and these, are those of `select_states`."""
+    constraints = problem.constrain(spread_directions(law.leader, pairs, directions), load)
+    return constraints, number_components(problem.mesh.pairs.slave[pairs])

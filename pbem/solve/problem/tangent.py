@@ -25,7 +25,7 @@ SolveCluster = Callable[[Integer, Real], Real | None]
 
 @dataclass(frozen=True)
 class Solved:
-    """Unknowns x (2 nodes,), v = M x + m (4 nodes,), and the relative residual of B v = 0.
+    """Unknowns x (2 nodes,), and the relative residual of B v = 0 for v = M x + m.
 
     checked: the residual is that of v itself, and within the tolerance. Else it is that of the condensed system, or of
     one that was solved loosely, and `check` has to confirm or complete it.
@@ -33,7 +33,6 @@ class Solved:
     """
 
     unknowns: Real
-    v: Real
     residual: float
     checked: bool = True
     linear_iterations: int = 0
@@ -91,6 +90,10 @@ class TangentOperator(Protocol):
 
         Raises ConvergenceError if it cannot be mended: "singular tangent", "linear solver".
         """
+
+    def evaluate(self, solved: Solved, constraints: ConstraintMap) -> Real:
+        """v = M x + m (4 nodes,) of a solution, on every rank."""
+        return constraints.evaluate(solved.unknowns)
 
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real

@@ -20,13 +20,14 @@ from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.clock import clock
+from pbem.contact.deferred_laws import free_jumps
 from pbem.contact.loads import Load
 from pbem.parallel import add_up
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import find_nearest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import SolveCluster
-from pbem.solve.tangent.sweeps import find_pairs, find_softness, free_jumps, halve_elements, take_near
+from pbem.solve.tangent.sweeps import find_pairs, find_softness, halve_elements, take_near
 
 # Elements belong to one cluster if they have one of the so many nearest elements in common.
 NEIGHBOURS = 16
@@ -137,7 +138,7 @@ class Clusters:
         problem, preconditioner = self._problem, self._preconditioner
         if not clusters:
             return
-        law = free_jumps(problem, ~problem.laws.follows)
+        law = free_jumps(problem.laws.leader, ~problem.laws.follows, problem.traction_scale)
         near = take_near(problem, preconditioner, law, self._load, [each.elements for each in clusters])
         known = np.unique(np.concatenate([each.pairs for each in clusters]))
         softness = find_softness(problem, preconditioner, self._load, known)

@@ -111,7 +111,7 @@ class CondensedTangent(TangentOperator):
             fresh = True
             self._factorise(load, law)
             unknowns, pairs = self._combine(load, law)
-        solved = Solved(unknowns, constraints.evaluate(unknowns), pairs.residual, checked=False)
+        solved = Solved(unknowns, pairs.residual, checked=False)
         return self.check(solved, constraints, load, law) if fresh or pairs.rcond < LEAST_RCOND else solved
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
@@ -202,7 +202,7 @@ class CondensedTangent(TangentOperator):
         offset = np.zeros_like(law.offset)
         offset[self.fixed] = fixed
         offset[self.varying, G_N] = problem.laws.gap[self.varying]
-        constant = problem.find_offset(Linearisation(known.laws, offset, law.leader), load)
+        constant = problem.constrain(Linearisation(known.laws, offset, law.leader), load).offset
         vector = join_load(constant, load, problem.traction_scale)
         loads, parts = known.loads.extend(vector, lambda: problem.apply(constant, load), self._solve_load)
         found = LoadSolution(load, fixed, constant, *loads.combine(parts))
@@ -224,7 +224,7 @@ class CondensedTangent(TangentOperator):
             residual = left_over / size_residual(scale, unknowns, constraints.given)
             if best is not None and not residual < best.residual:
                 break
-            best = Solved(unknowns, v, residual)
+            best = Solved(unknowns, residual)
             if left_over <= GOOD_RESIDUAL * scale or not np.isfinite(residual):
                 break
             unknowns = unknowns + self._condense(self._solve_system(-left[:, None]), split)[0][:, 0]

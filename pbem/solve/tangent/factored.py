@@ -8,6 +8,7 @@ from scipy import sparse
 from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
+from pbem.contact.map_entries import are_equal
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts
@@ -48,7 +49,7 @@ class FactoredTangent(TangentOperator):
         scale = problem.measure(forced)
         if scale == 0.0:
             unknowns = np.zeros(problem.unknowns)
-            return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
+            return Solved(unknowns, 0.0)
         tolerance = problem.model.solver.newton_tolerance
         unknowns = self._solve_by_any(constraints, -forced)
         for attempt in range(2):
@@ -56,7 +57,7 @@ class FactoredTangent(TangentOperator):
             left = problem.apply(v, load)
             residual = problem.measure(left) / size_residual(scale, unknowns, constraints.given)
             if residual <= tolerance:
-                return Solved(unknowns, v, residual)
+                return Solved(unknowns, residual)
             if attempt == 0 and np.isfinite(residual):
                 unknowns = unknowns - self._solve_by_any(constraints, left)
         self.factored = None  # whatever comes next is solved with factors of its own
@@ -130,9 +131,3 @@ class FactoredTangent(TangentOperator):
     def destroy(self) -> None:
         """See TangentOperator."""
         self.reference.destroy()
-
-
-def are_equal(one: sparse.csr_matrix, other: sparse.csr_matrix) -> bool:
-    """Whether two constraint maps are the same numbers in the same places."""
-    parts = ((one.indptr, other.indptr), (one.indices, other.indices), (one.data, other.data))
-    return all(np.array_equal(mine, yours) for mine, yours in parts)

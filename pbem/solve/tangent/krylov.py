@@ -21,7 +21,7 @@ from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.response import select_states
+from pbem.solve.problem.response import spread_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.clusters import Clusters
 from pbem.solve.tangent.krylov_calls import (
@@ -30,7 +30,6 @@ from pbem.solve.tangent.krylov_calls import (
     Rows,
     carry_solution,
     describe_unsolved,
-    find_order,
     is_unsolved,
     refuse_unsolved,
     take_options,
@@ -86,10 +85,9 @@ class KrylovTangent(TangentOperator):
         times as many elements around them."""
         self.problem = problem
         self.preconditioner = preconditioner
-        self._product = SharedProduct(problem, shared)
+        self.product, self._shared = SharedProduct(problem, shared), shared
         self._groups, self._widen_groups = groups, widen
         self.constraints: ConstraintMap | None = None
-        self._known: ConstraintMap | None = None  # that of which GMRES has its directions
         self.solution: Real | None = None
         self.law: Linearisation | None = None
         # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
@@ -99,9 +97,8 @@ class KrylovTangent(TangentOperator):
         self._settling = Settling(MOST_SETTLED if nearby else MOST_SETTLED_BY_GMRES, False, nearby)
         self.widening = 1
         sizes = ((2 * len(problem.system.nodes), problem.unknowns),) * 2
-        self._local = LocalContact(problem, preconditioner, groups)
+        self._local = LocalContact(problem, preconditioner, self.product, groups)
         self._parts, self._by_parts = PartInverses(problem), False
-        self._order = find_order(problem)
         self._matrix = PETSc.Mat().createPython(sizes, Product(self), comm=problem.comm)
         self._matrix.setUp()
         self._right, self._left = self._matrix.createVecs()
@@ -133,54 +130,50 @@ class KrylovTangent(TangentOperator):
         self._by_parts = loosely and law is not None and self._parts.suit(law)
         self._move_on(constraints, load, law)
         self.constraints, self._space.residual = constraints, np.zeros(0)
-        begin = self.solution
+        begin = None if self.solution is None else self.solution.reshape(-1, 2)[self.problem.system.nodes].ravel()
         if begin is not None and law is not None and self.law is not None:
             begin = carry_solution(self.problem, begin, self.law, law, self.expected)
             self.expected = None
         self.law = law
-        self._now = self._begin(constraints, load, begin, loosely)
+        self._now = self._begin(load, begin, loosely)
         if self._now.scale == 0.0:
-            unknowns = np.zeros(self.problem.unknowns)
-            return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
+            return Solved(np.zeros(self.problem.unknowns), 0.0)
         return self._solve_loosely(constraints, forcing) if loosely else self._complete(constraints, load)
 
     def _move_on(self, constraints: ConstraintMap, load: Load, law: Linearisation | None) -> None:
         """Make preconditioner and GMRES ready for a constraint map; directions of the same operator serve on."""
-        if self._known is None or not constraints.acts_as(self._known):
-            self._forget()
-            give_back()
-            self._known = constraints
-        self._product.take_map(constraints)
+        self._take_map(constraints)
         if self._by_parts and law is not None:
             self.preconditioner.pass_over(constraints)
             self._parts.form(law, self._local.divide(load).parts)
         else:
             self.preconditioner.update(constraints)
 
-    def _forget(self) -> None:
-        self._known = None
-        self._space.forget()
+    def _take_map(self, constraints: ConstraintMap) -> None:
+        """Take a constraint map; the directions of GMRES are dropped where they are those of another operator."""
+        if self.product.take_map(constraints):
+            self._space.forget()
+            give_back()
 
-    def _begin(self, constraints: ConstraintMap, load: Load, begin: Real | None, loosely: bool) -> _Iterate:
-        """The first iterate, from unknowns (unknowns,) that are nearly the solution.
+    def _begin(self, load: Load, begin: Real | None, loosely: bool) -> _Iterate:
+        """The first iterate, from this rank's part of unknowns that are nearly the solution.
 
         Other loads or modes can make these much worse than none: that multiple is taken whose product is nearest to the
         right-hand side (theory, 110); loosely, under the same load: as they are, if that is no worse than none.
         """
         problem, rows = self.problem, self.problem.system.nodes
         if begin is not None:
-            part = begin.reshape(-1, 2)[rows].ravel()
-            residual = problem.apply(constraints.evaluate(begin), load, constraints.released)
+            residual = self.product.balance(self.product.evaluate(begin), load)
             if loosely and self._now.load is load and 0 < problem.measure(residual) <= self._now.scale:
-                return _Iterate(load, part, residual, self._now.scale)
-        forced = problem.apply(constraints.offset, load, constraints.released)
+                return _Iterate(load, begin, residual, self._now.scale)
+        forced = self.product.balance(self.product.evaluate(None), load)
         scale = problem.measure(forced)
         if begin is None:
             return _Iterate(load, np.zeros(2 * len(rows)), forced, scale)
         product = residual - forced
         sums = add_up(problem.comm, np.array([-(product @ forced), product @ product]))
         factor = sums[0] / sums[1] if sums[1] > 0 else 0.0
-        return _Iterate(load, factor * part, forced + factor * product, scale)
+        return _Iterate(load, factor * begin, forced + factor * product, scale)
 
     def _solve_loosely(self, constraints: ConstraintMap, forcing: float) -> Solved:
         """Until the residual is only this part of what it is (theory, 88); its true size is not asked for.
@@ -197,28 +190,26 @@ class KrylovTangent(TangentOperator):
         off, left = self.preconditioner.correct(now.residual)
         self._now = replace(now, part=now.part - off, residual=self.preconditioner.turn_back(left))
         unknowns = self.solution = self.gather(self._now.part)
-        residual = self.problem.measure(left) / size_residual(now.scale, unknowns, constraints.given)
+        residual = self.problem.measure(left) / size_residual(now.scale, unknowns, self.product.measure_given())
         count += self.iterations[-1]
-        return Solved(unknowns, constraints.evaluate(unknowns), residual, False, count, loosely=True)
+        return Solved(unknowns, residual, False, count, loosely=True)
 
     def _complete(self, constraints: ConstraintMap, load: Load) -> Solved:
         """The solution to the tolerance, from the iterate on."""
         problem, tolerance, now = self.problem, self.problem.model.solver.newton_tolerance, self._now
-        residual, count, anew = np.inf, 0, False
+        residual, count, anew, given = np.inf, 0, False, self.product.measure_given()
         for _ in range(MOST_ATTEMPTS):
             before = residual
             now = self._improve(now, self._tolerance * now.scale)
             count += self.iterations[-1]
             if not self._keeps_directions:
-                v = constraints.evaluate(self.gather(now.part))
-                now = replace(now, residual=problem.apply(v, load, constraints.released))
+                now = replace(now, residual=self.product.balance(self.product.evaluate(now.part), load))
             # The tractions of crack pairs are those of the jumps to rounding: pairs are judged by them.
             off, _ = self.preconditioner.correct(now.residual)
-            unknowns = self.gather(now.part - off)
-            v = constraints.evaluate(unknowns)
-            true = problem.apply(v, load, constraints.released)
-            now = replace(now, part=now.part - off, residual=true)
-            residual = problem.measure(true) / size_residual(now.scale, unknowns, constraints.given)
+            part = now.part - off
+            unknowns = self.gather(part)
+            now = replace(now, part=part, residual=self.product.balance(self.product.evaluate(part), load))
+            residual = problem.measure(now.residual) / size_residual(now.scale, unknowns, given)
             solved = residual <= tolerance
             widened = self.iterations[-1] > SLOW and self._widen()
             if widened:  # when solved, too: `respond` goes on with the same constraint map
@@ -226,7 +217,7 @@ class KrylovTangent(TangentOperator):
                 self._solver.getPC().setUp()
             if solved:
                 self.solution, self._now = unknowns, now
-                return Solved(unknowns, v, residual, linear_iterations=count)
+                return Solved(unknowns, residual, linear_iterations=count)
             # Of slender bodies GMRES' own residual is off by rounding: on from the true one, once without directions.
             helps = residual < 0.1 * before
             if not widened and (self.iterations[-1] >= self._solver.getTolerances()[3] or (anew and not helps)):
@@ -282,7 +273,8 @@ class KrylovTangent(TangentOperator):
         """See TangentOperator; what was solved loosely is gone on with."""
         if solved.checked:
             return solved
-        forced = self.problem.apply(constraints.offset, load, constraints.released)
+        self._take_map(constraints)
+        forced = self.product.balance(self.product.evaluate(None), load)
         self._now = replace(self._now, scale=self.problem.measure(forced))
         full = self._complete(constraints, load)
         return replace(full, linear_iterations=solved.linear_iterations + full.linear_iterations)
@@ -295,15 +287,16 @@ class KrylovTangent(TangentOperator):
         Of cracks that meet, where the pairs are many, with the elements near to them alone.
         """
         self.constraints = constraints
-        self._product.take_map(constraints)
+        self._take_map(constraints)
         if self.settling.nearby and len(pairs) > MOST_ASKED:
             return respond_nearby(self.problem, self.preconditioner, constraints, load, law, pairs, directions)
-        states, unknowns = select_states(self.problem, load, law, pairs, directions)
+        spread, unknowns = spread_states(self.problem, load, law, pairs, directions)
+        states = self.product.take_seen(spread)[:, unknowns].tocsc()
         result = np.empty((len(unknowns), len(unknowns)))
         usual = self._solver.getTolerances()
         self._solver.setTolerances(rtol=RESPONSE, atol=0.0)
         for k in range(states.shape[1]):
-            result[:, k] = self._find_unknowns(-self._apply(np.asarray(states[:, k])))[unknowns]
+            result[:, k] = self._find_unknowns(-self.product.apply(states[:, [k]].toarray()[:, 0]))[unknowns]
         self._solver.setTolerances(*usual)
         return result
 
@@ -312,7 +305,7 @@ class KrylovTangent(TangentOperator):
         solved: Solved, judge: Judge,
     ) -> ModeState:
         """See TangentOperator; the next solution begins from the states that go with the modes."""
-        settled, self.expected = self._local.divide(load).settle(constraints, modes, memory, load, law, solved, judge)
+        settled, self.expected = self._local.divide(load).settle(modes, memory, load, law, solved, judge)
         return settled
 
     def expect(self, states: Real) -> None:
@@ -325,32 +318,37 @@ class KrylovTangent(TangentOperator):
             load, lambda: self._space.must_stop() and self._stop()) if self.settling.nearby else None
 
     def gather(self, part: Real) -> Real:
-        """A vector (unknowns,) on every rank, in the order of the nodes, from the ranks' parts."""
-        whole = np.empty(self.problem.unknowns)
-        whole[self._order] = gather_parts(self.problem.comm, part)
-        return whole
+        """A vector of two values a node (2 nodes,) on every rank, from the ranks' parts."""
+        if self.problem.comm.size == 1:
+            return part
+        # The ranks' own nodes are those of their own elements, rising.
+        owner = self._shared.share.of_element
+        whole = np.empty((len(owner), 2 * (self.problem.mesh.order + 1)))
+        whole[np.argsort(owner, kind="stable")] = gather_parts(self.problem.comm, part).reshape(whole.shape)
+        return whole.ravel()
+
+    def evaluate(self, solved: Solved, constraints: ConstraintMap) -> Real:
+        """See TangentOperator; each rank forms the map of its own nodes."""
+        own = self.problem.system.nodes
+        part = constraints.take_rows(own) @ solved.unknowns + constraints.take_offset(own)
+        return np.concatenate([self.gather(half) for half in part.reshape(2, -1)])
 
     def multiply(self, part: Real) -> Real:
         """This rank's rows of B M x for its part of x."""
-        return self._product.multiply(part)
+        return self.product.multiply(part)
 
     def precondition(self, part: Real) -> Real:
         """This rank's part of the preconditioned residual, for its part of the residual."""
         if self._by_parts:
-            return self._parts.apply(self._product.surround(part, self._parts.beyond))
+            return self._parts.apply(self.product.surround(part, self._parts.beyond))
         result, inner = np.zeros(len(part)), self.preconditioner
-        inner.apply(part if inner.whole else self._product.surround(part, inner.beyond), result)
+        inner.apply(part if inner.whole else self.product.surround(part, inner.beyond), result)
         return result
-
-    def _apply(self, v: Real) -> Real:
-        """This rank's rows of B v, without the anchors that do not act."""
-        assert self.constraints is not None
-        return self.problem.system.apply(v) - self.problem.find_released(v, self.constraints.released)
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
         """See TangentOperator; without the anchors that the constraint map releases."""
         self.constraints = constraints
-        self._product.take_map(constraints)
+        self._take_map(constraints)
         return self._find_unknowns(forces)
 
     def _find_unknowns(self, forces: Real) -> Real:
@@ -379,17 +377,17 @@ class KrylovTangent(TangentOperator):
         self.solution, self.law, self.expected = (remembered[name] for name in ("solution", "law", "expected"))
         if remembered["scale"]:
             self._now = _Iterate(load, np.zeros(0), np.zeros(0), remembered["scale"])
-        self._forget()
+        self._space.forget()
         while self.widening < remembered["widening"] and self._widen():
             pass
 
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
         self.problem, self.expected, self._parts = problem, None, PartInverses(problem)
-        self._local = LocalContact(problem, self.preconditioner, self._groups)
-        self._product.take_over(problem)
+        self._local = LocalContact(problem, self.preconditioner, self.product, self._groups)
+        self.product.take_over(problem)
         self.preconditioner.most_drift = MOST_DRIFT
-        self._forget()
+        self._space.forget()
 
     def destroy(self) -> None:
         """See TangentOperator."""

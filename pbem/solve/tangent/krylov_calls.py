@@ -6,11 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Real
 from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
-from pbem.mesh.numbering import number_components
-from pbem.parallel import gather_parts
 from pbem.solve.petsc.session import PREFIX, PETSc, petsc_options
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.problem.problem import Problem
@@ -103,24 +101,19 @@ def choose_options() -> dict[str, str]:
 
 
 def carry_solution(
-    problem: Problem, solution: Real, before: Linearisation, law: Linearisation, expected: Real | None
+    problem: Problem, part: Real, before: Linearisation, law: Linearisation, expected: Real | None
 ) -> Real:
-    """The last solution (unknowns,), under the laws before, in the present unknowns; expected (m, 4): states that are
-    expected of the pairs, None for those of the solution."""
-    slave = problem.mesh.pairs.slave
-    carried = solution.reshape(-1, 2).copy()
-    state = np.einsum("mij,mj->mi", before.tangent, carried[slave]) + before.offset
+    """This rank's part of the last solution (own unknowns,), under the laws before, in the present unknowns.
+
+    expected (m, 4): states that are expected of the pairs, None for those of the solution."""
+    nodes, slave, carried = problem.system.nodes, problem.mesh.pairs.slave, part.reshape(-1, 2).copy()
+    own = np.flatnonzero(np.isin(slave, nodes))
+    at, leader = np.searchsorted(nodes, slave[own]), problem.laws.leader
+    state = before.take(own).apply(carried[at])
     if expected is not None:
-        state = np.where(problem.laws.follows[:, None], state, expected)
-    carried[slave] = carry_over(state, law, problem.traction_scale)
+        state = np.where((leader[own] != own)[:, None], state, expected[own])
+    carried[at] = carry_over(state, law.take(own), problem.traction_scale)
     return carried.ravel()
-
-
-def find_order(problem: Problem) -> Integer:
-    """Unknowns of all ranks, one rank after the other."""
-    own = problem.system.nodes.astype(float)
-    nodes = gather_parts(problem.comm, own).astype(np.int64)
-    return number_components(nodes)
 
 
 def is_unsolved(solver: PETSc.KSP) -> bool:

@@ -9,6 +9,7 @@ from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.tangent.clusters import Clusters
+from pbem.solve.tangent.shared_product import SharedProduct
 from pbem.solve.tangent.sweeps import Sweeps
 
 
@@ -16,9 +17,10 @@ class LocalContact:
     """The groups of this rank that settle before solutions, and clusters around pairs that need it, of one problem."""
 
     def __init__(
-        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Sequence[Subdomain]
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, product: SharedProduct,
+        groups: Sequence[Subdomain],
     ) -> None:
-        self._problem, self._preconditioner, self._groups = problem, preconditioner, groups
+        self._problem, self._preconditioner, self._product, self._groups = problem, preconditioner, product, groups
         self.forget()
 
     def forget(self) -> None:
@@ -29,7 +31,7 @@ class LocalContact:
     def divide(self, load: Load) -> Sweeps:
         """The groups; under any load of the problem."""
         if self._sweeps is None:
-            self._sweeps = Sweeps(self._problem, self._preconditioner, self._groups, load)
+            self._sweeps = Sweeps(self._problem, self._preconditioner, self._product, self._groups, load)
         return self._sweeps
 
     def find_clusters(self, load: Load, pause: Callable[[], object]) -> Clusters:

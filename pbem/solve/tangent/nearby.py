@@ -19,6 +19,7 @@ from pbem.arrays import Complex, Integer, Real
 from pbem.bem.group_sizes import do_cracks_meet
 from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
+from pbem.contact.deferred_laws import spread_directions
 from pbem.contact.laws import ModeState, PairState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal
@@ -83,9 +84,7 @@ def respond_nearby(
 
     Zero between sets of pairs that are far apart.
     """
-    spread = np.zeros_like(law.tangent)
-    spread[pairs] = directions
-    offsets = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
+    offsets = problem.constrain(spread_directions(law.leader, pairs, directions), load)
     result = np.zeros((2 * len(pairs), 2 * len(pairs)))
     slave = problem.mesh.pairs.slave[pairs]
     tree = cKDTree(_at(0.5 * (problem.mesh.start + problem.mesh.end)))
@@ -97,7 +96,7 @@ def respond_nearby(
         unknowns = number_components(slave[members])
         at = number_components(members)
         result[np.ix_(at, at)] = preconditioner.respond(
-            constraints.matrix, offsets, np.union1d(own, further), unknowns
+            constraints, offsets, np.union1d(own, further), unknowns
         )
     return add_up(problem.comm, result)
 

@@ -51,10 +51,12 @@ class PartInverses:
         if self._parts is not parts:
             self._place(parts)
         self.forget()
-        tractions, jumps = law.tangent[:, :2] / self._problem.traction_scale, law.tangent[:, 2:]
+        tangents = law.take(parts.known).tangent
+        tractions, jumps = tangents[:, :2] / self._problem.traction_scale, tangents[:, 2:]
         with clock.piece("preconditioner"):
             for (near, _, stiffness), (_, own) in zip(parts.list(), self._places, strict=True):
-                self._rows.append(_invert(tractions[near], jumps[near], stiffness, own))
+                at = np.searchsorted(parts.known, near)
+                self._rows.append(_invert(tractions[at], jumps[at], stiffness, own))
 
     def _place(self, parts: Parts) -> None:
         """Of each part the places of its pairs' tractions among those of the nodes here and beyond, and the own of

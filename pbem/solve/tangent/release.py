@@ -63,9 +63,10 @@ class ReleasedTangent(TangentOperator):
         assert constraints.released is not None
         forces = self._share_forces(constraints.released)
         self.responses = self.anchored.solve_forces(constraints, load, law, forces)
-        unknowns = self._complete(held.unknowns[:, None], (held.v - load.known)[:, None], constraints)[:, 0]
+        v = constraints.evaluate(held.unknowns) - load.known
+        unknowns = self._complete(held.unknowns[:, None], v[:, None], constraints)[:, 0]
         if not held.checked:
-            return Solved(unknowns, constraints.evaluate(unknowns), held.residual, checked=False)
+            return Solved(unknowns, held.residual, checked=False)
         scale = problem.measure(problem.apply(constraints.offset, load, constraints.released)) or 1.0
         best: Solved | None = None
         for _ in range(1 + MOST_CORRECTIONS):
@@ -74,7 +75,7 @@ class ReleasedTangent(TangentOperator):
             residual = problem.measure(left) / size_residual(scale, unknowns, constraints.given)
             if best is not None and not residual < best.residual:
                 break
-            best = Solved(unknowns, v, residual)
+            best = Solved(unknowns, residual)
             if residual <= GOOD_RESIDUAL or not np.isfinite(residual):
                 break
             change = self.anchored.solve_forces(constraints, load, law, -left[:, None])

@@ -19,11 +19,12 @@ from scipy.spatial import cKDTree
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.group_sizes import PART_ELEMENTS, PART_SHARE
 from pbem.contact.complementarity import Subset, take_subset
-from pbem.contact.constraints import ConstraintMap, evaluate_pairs
+from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.deferred_laws import free_jumps
 from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.local_laws import Single, solve_laws
-from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, linearise
+from pbem.contact.modes import Linearisation, linearise
 from pbem.heap import give_back
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
@@ -33,6 +34,7 @@ from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain, find_nearest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Judge, Solved
+from pbem.solve.tangent.shared_product import SharedProduct
 
 # All groups settle so often in turn between two solutions of the whole, each by so many of Newton's steps at most.
 MOST_SWEEPS = 3
@@ -76,10 +78,11 @@ class Sweeps:
     """
 
     def __init__(
-        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Iterable[Subdomain], load: Load
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, product: SharedProduct,
+        groups: Iterable[Subdomain], load: Load,
     ) -> None:
-        self._problem, mesh = problem, problem.mesh
-        self._jumps = free_jumps(problem, ~problem.laws.follows)
+        self._problem, self._product, mesh = problem, product, problem.mesh
+        self._jumps = free_jumps(problem.laws.leader, ~problem.laws.follows, problem.traction_scale)
         self._held = np.flatnonzero(np.isin(mesh.pairs.slave, problem.system.nodes))
         pair_of_node = np.full(mesh.nodes, -1)
         pair_of_node[mesh.pairs.slave] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
@@ -105,8 +108,7 @@ class Sweeps:
         give_back()
 
     def settle(
-        self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
-        solved: Solved, judge: Judge,
+        self, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved, judge: Judge
     ) -> tuple[ModeState, Real]:
         """Modes (m,) that follow from a solution in some modes, and the states (m, 4) that go with them.
 
@@ -119,7 +121,7 @@ class Sweeps:
         values[:, :2] /= problem.traction_scale
         for sweep in range(MOST_SWEEPS):
             if sweep:
-                values[:, :2] = self.find_tractions(constraints, load, solved, values[:, 2:])
+                values[:, :2] = self.find_tractions(load, solved, values[:, 2:])
             start = replace(subset, modes=ModeState(modes.mode[pairs], modes.sign[pairs]))
             settled, reached = self._settle_groups(start, values[pairs], judge, sweep > 0)
             found = np.zeros((len(values), 6))
@@ -168,7 +170,7 @@ class Sweeps:
                 result[own] = found
         return result
 
-    def find_tractions(self, constraints: ConstraintMap, load: Load, solved: Solved, jumps: Real) -> Real:
+    def find_tractions(self, load: Load, solved: Solved, jumps: Real) -> Real:
         """Tractions (m, 2) of all pairs, in units of the traction scale, from their jumps (m, 2); all ranks together.
 
         Outer boundaries are as in the solution.
@@ -176,8 +178,8 @@ class Sweeps:
         problem, mesh = self._problem, self._problem.mesh
         unknowns = solved.unknowns.reshape(-1, 2).copy()
         unknowns[mesh.pairs.slave] = np.where(problem.laws.follows[:, None], 0.0, jumps)
-        v = problem.constrain(self._jumps, load).evaluate(unknowns.ravel())
-        equations = problem.apply(v, load, constraints.released).reshape(-1, 2)
+        v = self._product.evaluate_by(problem.constrain(self._jumps, load), unknowns.ravel())
+        equations = self._product.balance(v, load).reshape(-1, 2)
         place = np.searchsorted(problem.system.nodes, mesh.pairs.slave[self._held])
         result = np.zeros((mesh.pairs.count, 2))
         result[self._held] = -(self.parts.soften(self._held) @ equations[place][..., None])[..., 0]
@@ -213,7 +215,7 @@ def take_near(
 ) -> NearMap:
     """The constraint map of a law, of the nodes of parts' elements."""
     elements = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *parts]))
-    return preconditioner.take_near(problem.constrain(law, load).matrix, list_nodes(problem.mesh, elements))
+    return preconditioner.take_near(problem.constrain(law, load), list_nodes(problem.mesh, elements))
 
 
 def find_softness(
@@ -222,9 +224,10 @@ def find_softness(
     """The softness (k, 2, 2) of pairs (k,), rising: see `Parts`."""
     slave = problem.mesh.pairs.slave[pairs]
     nodes = np.sort(slave)
-    closed = problem.constrain(free_jumps(problem, np.zeros(problem.laws.count, dtype=bool)), load)
+    laws, none = problem.laws, np.zeros(problem.laws.count, dtype=bool)
+    closed = problem.constrain(free_jumps(laws.leader, none, problem.traction_scale), load)
     # The tractions of a crack's pair are in its own node's equations alone.
-    own_equations = preconditioner.take_near(closed.matrix, nodes).take_blocks()
+    own_equations = preconditioner.take_near(closed, nodes).take_blocks()
     return np.asarray(np.linalg.inv(own_equations[np.searchsorted(nodes, slave)]))
 
 
@@ -232,14 +235,6 @@ def find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer:
     """The pairs on elements that have a mode of their own, rising."""
     pairs = pair_of_node[list_nodes(mesh, elements)]
     return np.sort(pairs[pairs >= 0])
-
-
-def free_jumps(problem: Problem, jumps: Bool) -> Linearisation:
-    """The law of pairs that are free to have any jumps, without tractions, where jumps (m,); else any tractions."""
-    tangent = np.zeros((problem.laws.count, 4, 2))
-    tangent[jumps, G_N, 0] = tangent[jumps, G_S, 1] = 1.0
-    tangent[~jumps, P_N, 0] = tangent[~jumps, P_S, 1] = problem.traction_scale
-    return Linearisation(tangent, np.zeros((problem.laws.count, 4)), problem.laws.leader)
 
 
 def _name_state(values: Real, scale: float) -> PairState:

@@ -108,6 +108,30 @@ initial_stress = { m = { sxx = -0.3, syy = -1.0 }, coal = { sxx = -0.3, syy = -1
     match = re.search(r"sides of 'plane' lie (\S+) deep", note)
     assert match is not None
     np.testing.assert_allclose(float(match[1]), DEPTH - 0.002, rtol=0.02)
+    assert "can be drawn as a crack" in note
+
+
+def test_a_seam_drawn_as_a_crack_with_a_gap_closes_and_bears_what_is_left(tmp_path: Path) -> None:
+    """What is advised: mined, roof and floor touch in the middle, where they bear less than before, and nowhere lie in
+    each other; without the gap as wide as its closure they do not touch."""
+    text = """
+materials.m = {{ young = 1e3, poisson = 0.25 }}
+curves.seam = {{ points = [[-1, 0], [1, 0]], elements = 10 }}
+regions.rock = {{ material = "m", infinite = true, cracks = ["seam"] }}
+initial_stress.m = {{ sxx = -0.3, syy = -1.0 }}
+interfaces.seam = {{ law = "coulomb", friction = 0.3, gap = {} }}
+stages = [{{ name = "before", steps = 1, close = ["seam"] }}, {{ name = "mine", steps = 1, release = ["seam"] }}]
+"""
+    assert not solve(text.format(0.002), tmp_path)
+    seam = pbem.open_results(tmp_path / "case.h5").contact["seam"]
+    np.testing.assert_allclose(seam.traction_n[0], -1.0, rtol=1e-9)
+    middle = np.abs(np.array(seam.position)[:, 0]) < 0.3
+    assert (seam.mode[-1][middle] != 2).all() and (seam.traction_n[-1][middle] < -0.3).all()
+    assert seam.opening[-1].min() > -1e-12
+    solve(text.format(0.004), tmp_path)
+    seam = pbem.open_results(tmp_path / "case.h5").contact["seam"]
+    x = np.array(seam.position)[:, 0]
+    np.testing.assert_allclose(seam.opening[-1], 0.004 - DEPTH * np.sqrt(1 - x**2), rtol=0.01)
 
 
 @pytest.mark.parametrize("bodies", [1, 2])

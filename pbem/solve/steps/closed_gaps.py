@@ -48,7 +48,9 @@ def find_closed_gap(model: Model, mesh: Mesh, displacement: Complex) -> Passing 
         return None
     names = [mesh.region_names[mesh.node_region[node]] for node in (own[at], across[at])]
     place = complex(mesh.position[own[at]] + displacement[own[at]]) + model.origin
-    return Passing(names[0], names[1], float(depth[at]), place)
+    gone = np.unique(mesh.curve[np.array([region.removed for region in model.regions])[mesh.region]])
+    bared = bool(np.isin(mesh.curve[mesh.node_element[[own[at], across[at]]]], gone).all())
+    return Passing(names[0], names[1], float(depth[at]), place, bared)
 
 
 def _find_free(model: Model, mesh: Mesh) -> Bool:

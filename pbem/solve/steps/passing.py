@@ -26,6 +26,7 @@ class Passing:
     second: str
     depth: float
     place: complex
+    bared: bool = False
 
 
 def find_passing(model: Model, mesh: Mesh, displacement: Complex) -> Passing | None:
@@ -53,16 +54,21 @@ def find_passing(model: Model, mesh: Mesh, displacement: Complex) -> Passing | N
 
 def describe_passing(found: Passing) -> str:
     """A sentence, and what to do."""
+    where = f"{found.depth:.3g} deep"
+    place = f"({found.place.real:.6g}, {found.place.imag:.6g})"
     if found.first == found.second:
-        return (
-            f"sides of '{found.first}' lie {found.depth:.3g} deep in each other at ({found.place.real:.6g}, "
-            f"{found.place.imag:.6g}), across what was a gap: nothing keeps them apart; draw them as curves of their "
-            "own and add a table [contacts.NAME] between these if they are to touch")
-    return (
-        f"'{found.first}' lies {found.depth:.3g} deep inside '{found.second}' at ({found.place.real:.6g}, "
-        f"{found.place.imag:.6g}): nothing keeps them apart, as they have no contact with each other; add a table "
-        "[contacts.NAME] between their curves if they are to touch"
-    )
+        what = f"sides of '{found.first}' lie {where} in each other at {place}, across what was a gap: "
+    else:
+        what = f"'{found.first}' lies {where} inside '{found.second}' at {place}: "
+    if found.bared:
+        return what + ("nothing keeps the sides apart that a stage has bared; a thin region that is removed can be "
+                       "drawn as a crack with a law and its width as `gap`, which one stage closes and a later one "
+                       "releases")
+    if found.first == found.second:
+        return what + ("nothing keeps them apart; draw them as curves of their own and add a table [contacts.NAME] "
+                       "between these if they are to touch")
+    return what + ("nothing keeps them apart, as they have no contact with each other; add a table [contacts.NAME] "
+                   "between their curves if they are to touch")
 
 
 def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex) -> list[tuple[int, int]]:

@@ -73,16 +73,6 @@ class Sorted:
     terms: int
 
     @cached_property
-    def node_element(self) -> Integer:
-        """Mesh.node_element, which the mesh makes anew at every call."""
-        return self.mesh.node_element
-
-    @cached_property
-    def node_local(self) -> Real:
-        """Mesh.node_local, likewise."""
-        return self.mesh.node_local
-
-    @cached_property
     def first_element(self) -> Integer:
         """Number of each region's first element."""
         return np.searchsorted(self.mesh.region, np.arange(len(self.materials)))
@@ -345,7 +335,7 @@ def _evaluate_leaf(
     chosen = parts.sources[region].select(elements - parts.first_element[region])
     material = parts.materials[region]
     bounded = bool((chosen.family == 0).any())
-    on = np.searchsorted(elements, parts.node_element[nodes])
+    on = np.searchsorted(elements, nodes // (mesh.order + 1))
     width = 2 * len(elements) * (mesh.order + 1)
     columns = list_columns(mesh, list_nodes(mesh, elements), 2 * width if bounded else width)
     kept = needed[columns]
@@ -360,7 +350,7 @@ def _evaluate_leaf(
             continue
         own = nodes[at]
         normal = mesh.normal[own] if traction else None
-        values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, parts.node_local[own])
+        values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, mesh.take_local(own))
         whole = np.concatenate([value for value in values if value is not None], axis=1)
         near[number_components(at)] = whole[:, kept]
     return columns[kept], near

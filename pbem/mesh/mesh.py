@@ -136,6 +136,11 @@ class Mesh:
         """Coordinate s of every node on its element (n,)."""
         return np.where(self.crack[:, None], self.crack_local, self.local).ravel()
 
+    def take_local(self, nodes: Integer) -> Real:
+        """The same of some nodes (k,), without those of the others."""
+        element, place = np.divmod(nodes, self.order + 1)
+        return np.where(self.crack[element], self.crack_local[place], self.local[place])
+
     @property
     def node_element(self) -> Integer:
         return np.repeat(np.arange(self.elements), self.order + 1)

@@ -55,6 +55,8 @@ def test_nodes_are_numbered_element_after_element_region_after_region(blocks: tu
     assert mesh.nodes == 3 * mesh.elements == len(mesh.normal) == len(mesh.weight) == len(mesh.traction_equation)
     assert np.all(np.diff(mesh.region) >= 0)
     np.testing.assert_array_equal(mesh.node_element, np.arange(mesh.nodes) // 3)
+    some = np.random.default_rng(1).permutation(mesh.nodes)[: mesh.nodes // 2]
+    np.testing.assert_array_equal(mesh.take_local(some), mesh.node_local[some])
     straight = mesh.sweep == 0
     middle, half = (mesh.start + mesh.end) / 2, (mesh.end - mesh.start) / 2
     local = np.where(mesh.crack[:, None], place_crack_nodes(2), place_nodes(2))

@@ -132,8 +132,7 @@ class LocalOperator:
         mesh = self._mesh
         sources: Sources = self._sources[region].select(elements - self._first_element[region])
         bounded = bool((sources.family == 0).any())
-        element, own_place = np.divmod(nodes, self._per_element)
-        place, there = find_places(elements, element)
+        place, there = find_places(elements, nodes // self._per_element)
         on = np.where(there, place, -1)
         seen = list_nodes(mesh, elements)
         columns = number_components(seen)
@@ -145,7 +144,7 @@ class LocalOperator:
             first, count = self._first_element[region] * (mesh.order + 1), whole.shape[1] // 2
             at = np.concatenate([number_components(seen - first), count + number_components(seen - first)])
             return whole[np.ix_(number_components(nodes - first), at)], columns
-        local = np.where(mesh.crack[element], mesh.crack_local[own_place], mesh.local[own_place])
+        local = mesh.take_local(nodes)
         values = np.empty((2 * len(nodes), len(columns)))
         for traction in (False, True):
             at = np.flatnonzero(mesh.traction_equation[nodes] == traction)

@@ -98,7 +98,7 @@ class System(Protocol):
 class Problem:
     """What stays the same through a run; equal on all ranks but for `system`, which holds this rank's rows.
 
-    traction_scale: modulus/length, the unit of traction unknowns. equation_scale (nodes,): factors of the equations.
+    traction_scale: modulus/length, the unit of traction unknowns. equation_scale (k,): factors of its equations.
     anchors: in the system, for good; anchored: the free motions for which they were made. arrangement: of a stage in
     which not all is as the laws say, whose problem it is (see pbem.solve.problem.arranged); carried (m, 2): traction of
     the pairs that open in it at its beginning; settled_motion: where supports had moved the bodies by
@@ -221,8 +221,9 @@ class Problem:
     def find_far(self, load: Load) -> Real:
         """This rank's part of the equations that comes from far away; lengths (theory, 15)."""
         own = self.system.nodes
-        far = np.where(self.mesh.traction_equation[own], load.far[1, own], load.far[0, own]) * self.equation_scale[own]
-        return split_components(far)
+        of_tractions = self.mesh.traction_equation[own]
+        far: Complex = np.where(of_tractions, load.far[1, own], load.far[0, own])
+        return split_components(self.equation_scale * far)
 
     def find_released(self, v: Real, released: Real | None) -> Real | float:
         """This rank's rows of what released combinations (a, r) of the anchors add to B v."""

@@ -45,7 +45,7 @@ def join_problem(
         laws=laws,
         system=system,
         traction_scale=_scale_tractions(model),
-        equation_scale=scale_equations(mesh, [region.material for region in model.regions], model.size),
+        equation_scale=scale_equations(mesh, [region.material for region in model.regions], model.size, system.nodes),
         anchors=anchors,
         anchored=anchored,
     )

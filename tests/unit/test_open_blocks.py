@@ -144,9 +144,15 @@ def test_anchored_blocks_stay_where_they_were_and_all_else_moves_on() -> None:
     assert blocks.state is not None
     stays = np.isin(np.arange(COUNT), AROUND[1])
     np.testing.assert_array_equal(blocks.state.g_n, np.where(stays, state.g_n, moved.g_n))
-    # But where clusters lay them they are anchored anew.
-    blocks.settle(moved)
+    # But what settles in clusters is anchored there anew.
+    settled = np.arange(COUNT) >= 6
+    blocks.settle(moved, settled)
+    np.testing.assert_array_equal(blocks.state.g_n, np.where(stays & ~settled, state.g_n, moved.g_n))
+    # All is, where no mode changes.
+    blocks.move_on(moved, frozenset({2}), True)
     np.testing.assert_array_equal(blocks.state.g_n, moved.g_n)
+    blocks.driven = frozenset({2})
+    blocks.stiffen(law, modes)
     # Found to be driven, it moves on from the next iteration.
     blocks.move_on(state, frozenset({1}), False)
     blocks.stiffen(law, modes)
@@ -172,6 +178,11 @@ def test_what_is_left_over_on_blocks_that_float_does_not_count(
     load: Any = None  # measure_drive alone would need it
     borne[own], borne[other] = drive * FLOATING * usual, 1e-7 * size
     monkeypatch.setattr(open_blocks, "measure_drive", lambda *_: weight * OWN * drive * FLOATING * usual)
+    # What has opened around an anchored block since then is not left over: not before it is anchored anew.
+    assert blocks.measure_rest(state, borne, load)[0] == pytest.approx(borne[own[0]] / size, rel=1e-12, abs=0)
+    blocks.move_on(state, frozenset(), False)
+    assert not blocks.renewed
+    blocks.move_on(state, frozenset(), True)
     rest, driven = blocks.measure_rest(state, borne, load)
     np.testing.assert_allclose(rest, borne[own[0]] / size if counts else 1e-7, rtol=1e-12)
     assert driven == ({1} if block and counts else set())

@@ -60,9 +60,10 @@ class ClusterSearch:
     def settle(
         self, tangent: TangentOperator, search: Search, modes: ModeState, law: Linearisation, solved: Solved,
         state: PairState,
-    ) -> tuple[ModeState, PairState] | None:
+    ) -> tuple[ModeState, PairState, Bool] | None:
         """Modes and states (m,) of all pairs, with those of the clusters around the ones that change, and what all else
-        asks for; None if no cluster settles, or what is near says otherwise than the whole did. All ranks together.
+        asks for, and which pairs have settled; None if no cluster does, or what is near says otherwise than the whole
+        did. All ranks together.
 
         law, solved: linearised at the modes, and the solution; state: of the pairs in it.
         """
@@ -93,7 +94,7 @@ class ClusterSearch:
         search.swept = True
         state = put_states(state, values[:, 2:], settled)
         tangent.expect(stack_states(state))
-        return chosen, state
+        return chosen, state, settled
 
 
 def _put_modes(

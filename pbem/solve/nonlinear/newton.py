@@ -362,9 +362,10 @@ class _Run:
             return None
         settled = self.clusters.settle(
             self.tangent, self.search, self.modes, found.law, found.solved, found.outcome.pairs)
-        if settled is not None:
-            self.blocks.settle(settled[1])
-        return settled
+        if settled is None:
+            return None
+        self.blocks.settle(*settled[1:])
+        return settled[:2]
 
     def _move_on(self, found: _Iterated, cascade: Cascade | None) -> None:
         """Choose the modes of the next iteration, and where its laws are taken. Raises ConvergenceError ("mode cycle").

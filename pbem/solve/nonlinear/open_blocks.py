@@ -54,13 +54,15 @@ class OpenBlocks:
     """The proximal stiffness of open pairs in iterations after smoothed laws, alike on all ranks (theory, 127).
 
     smooth (m,): pairs that have one. state: from which the jumps change; None before there were smoothed laws. driven:
-    blocks that are not anchored though nothing holds them. fallen: what FALL makes of the stiffness by now.
+    blocks that are not anchored though nothing holds them. fallen: what FALL makes of the stiffness by now. renewed:
+    whether anchors act from the state of the last iteration, as no mode changed in it: then they bear what is left over
+    on their blocks, and not what has opened around these since they were anchored.
     """
 
     def __init__(self, problem: Problem, smooth: Bool) -> None:
         self._problem, self._smooth = problem, smooth
         self.state: PairState | None = None
-        self.fallen, self.least = 1.0, 0.0
+        self.fallen, self.least, self.renewed = 1.0, 0.0, False
         self.driven: frozenset[int] = frozenset()
         self._own = self._even_out()
         none = np.zeros(len(smooth))
@@ -75,21 +77,27 @@ class OpenBlocks:
 
     def begin(self, state: PairState) -> None:
         """Keep open pairs near to the jumps of a state from now on."""
-        self.state, self.fallen, self.least, self.driven = state, 1.0, 0.0, frozenset()
+        self.state, self.fallen, self.least, self.driven, self.renewed = state, 1.0, 0.0, frozenset(), False
 
     def move_on(self, state: PairState, driven: frozenset[int], calm: bool) -> None:
         """Take note of the state of an iteration, of the blocks that were driven in it, and of whether no mode changed.
         """
         if self.state is None:
             return
-        self.state = PairState(*(np.where(self._stiffness.anchored, old, new) for old, new in zip(
-            vars(self.state).values(), vars(state).values(), strict=True)))
+        self._refer(state, self._stiffness.anchored & (not calm))
+        self.renewed = calm
         self.driven = driven if calm else self.driven | driven
         self.fallen *= FALL if calm and self.fallen > self.least else 1.0
 
-    def settle(self, state: PairState) -> None:
-        """Take note of a state in which clusters settled by themselves: blocks are anchored where that lays them."""
-        self.state = None if self.state is None else state
+    def _refer(self, state: PairState, stays: Bool) -> None:
+        """Let the jumps of a state be what the stiffness acts from, but of pairs (m,) that stay."""
+        if self.state is not None:
+            self.state = PairState(*(np.where(stays, old, new) for old, new in zip(
+                vars(self.state).values(), vars(state).values(), strict=True)))
+
+    def settle(self, state: PairState, settled: Bool) -> None:
+        """Take note of a state in which clusters of pairs (m,) settled by themselves: these are anchored there anew."""
+        self._refer(state, self._stiffness.anchored & ~settled)
 
     def stiffen_again(self, error: ConvergenceError) -> bool:
         """After an error: whether it is of a system that could not be solved with so little stiffness, of which there
@@ -141,7 +149,7 @@ class OpenBlocks:
             own, _ = self._problem.cut.find_around(body)
             mean = weight[own] @ borne[own] / weight[own].sum()
             if mean <= FLOATING * usual and measure_drive(self._problem, body, load) <= OWN * mean:
-                floats[own] = True
+                floats[own] = self.renewed
             else:
                 driven.add(body)
         return float(borne[~floats].max(initial=0.0) / size) if size > 0 else np.inf, frozenset(driven)

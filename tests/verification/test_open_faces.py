@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.contact.laws import OPEN
 from pbem.results.describe import describe_results
 from pbem.results.facts import collect_facts
 from pbem.results.pushed_faces import find_pushed_faces
@@ -89,6 +90,17 @@ def test_a_crack_that_stays_open_under_pressure_is_told_with_its_depth(
 def test_faces_that_part_slide_or_touch_are_not_told(law: str, remote: str, tmp_path: Path) -> None:
     """Opened by a load, by fluid, kept apart by a gap wider than what closes, slid along each other, in contact."""
     results, notes = solve(write_crack(law.replace("\n", ", "), remote), tmp_path)
+    assert not notes
+    assert not find_pushed_faces(results)
+    assert "in each other" not in describe_results(results)
+
+
+def test_elastic_joints_under_a_fluid_are_not_told(tmp_path: Path) -> None:
+    """They are closed by less than the fluid closes them, and so open: by nothing that lies in anything."""
+    law = "friction = 0.3, normal_stiffness = 100.0, pressure = 2.0"
+    results, notes = solve(write_crack(law, "{ syy = -2.5 }"), tmp_path)
+    crack = results.contact["crack"]
+    assert (crack.opening[-1][crack.mode[-1] == OPEN] < -1e-3).any()
     assert not notes
     assert not find_pushed_faces(results)
     assert "in each other" not in describe_results(results)

@@ -148,7 +148,8 @@ def _solve_instant(
         if not lost.any():
             found = step_subset(problem, subset.modes, damped, judge, most=MOST_STEPS, shares=(0.0,))
         if found is None:
-            parted = part_for_good(before, damped, find_losing(before, problem) & (before.modes.mode == OPEN))
+            loses = find_losing(before, pose(before, damped))
+            parted = part_for_good(before, damped, loses & (before.modes.mode == OPEN))
             if parted is None or (lost.any() and taken > MOST_LACKING):
                 return None
             found, lost = parted

@@ -23,7 +23,7 @@ def describe_cusp(names: tuple[str, str], first: Sequence[Leg], second: Sequence
     """
     for one in first:
         for other in second:
-            for at_end in (False, True):
+            for at_end in (False, True) if one is not other else ():
                 point = one.end if at_end else one.start
                 if point not in (other.start, other.end):
                     continue
@@ -33,7 +33,8 @@ def describe_cusp(names: tuple[str, str], first: Sequence[Leg], second: Sequence
                 if angle < NARROW:
                     how = (f"touching each other at {format_point(point)} without an angle between them" if angle < NONE
                            else f"meeting at {format_point(point)} at an angle of {math.degrees(angle):.2g} degrees")
-                    return f"curves '{names[0]}' and '{names[1]}' {how}"
+                    what = f"curves '{names[0]}' and '{names[1]}'" if names[0] != names[1] else f"legs of '{names[0]}'"
+                    return f"{what} {how}"
     return None
 
 

@@ -658,3 +658,16 @@ def test_mutants(folder: Path) -> None:
     ends = [try_mutant(seed, folder) for seed in (*range(1000, 1012), 2926)]
     assert ends[-1][0] == "refused" and "expected a smaller distance: --snap" in ends[-1][1]
     assert {end for end, _ in ends} == {"accepted", "refused"}, [said for end, said in ends if end == "wrong"]
+
+
+def test_a_curve_that_turns_back_on_itself_is_told_by_the_angle(capsys: Capture) -> None:
+    """Not as two curves, one of which is the other."""
+    Path("case.toml").write_text("""
+remote = { syy = 1.0 }
+materials.rock = { young = 1e3, poisson = 0.25 }
+curves.crack = { points = [[0, 0], [1, 0], [0, 1e-4]], elements = 10 }
+regions.plane = { material = "rock", infinite = true, cracks = ["crack"] }
+interfaces.crack = { law = "open" }
+""")
+    assert main(["check", "case.toml"]) == 2
+    assert "legs of 'crack' meeting at (1, 0) at an angle of 0.0057 degrees" in capsys.readouterr().err

@@ -50,7 +50,7 @@ def find_closed_gap(model: Model, mesh: Mesh, displacement: Complex) -> Passing 
     place = complex(mesh.position[own[at]] + displacement[own[at]]) + model.origin
     gone = np.unique(mesh.curve[np.array([region.removed for region in model.regions])[mesh.region]])
     bared = bool(np.isin(mesh.curve[mesh.node_element[[own[at], across[at]]]], gone).all())
-    return Passing(names[0], names[1], float(depth[at]), place, bared)
+    return Passing(names[0], names[1], float(depth[at]), place, across=True, bared=bared)
 
 
 def _find_free(model: Model, mesh: Mesh) -> Bool:

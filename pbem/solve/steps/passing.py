@@ -20,12 +20,13 @@ SLIGHT = 1e-2
 class Passing:
     """Of two bodies the deepest place (complex) of the first inside of the second, and how deep it lies (length).
 
-    They are the same one where the sides of a gap in it are moved into each other."""
+    across: whether sides of a gap between two curves are moved into each other, of one body or of two."""
 
     first: str
     second: str
     depth: float
     place: complex
+    across: bool = False
     bared: bool = False
 
 
@@ -56,17 +57,18 @@ def describe_passing(found: Passing) -> str:
     """A sentence, and what to do."""
     where = f"{found.depth:.3g} deep"
     place = f"({found.place.real:.6g}, {found.place.imag:.6g})"
-    if found.first == found.second:
-        what = f"sides of '{found.first}' lie {where} in each other at {place}, across what was a gap: "
+    if found.across:
+        whose = f"'{found.first}'" if found.first == found.second else f"'{found.first}' and '{found.second}'"
+        what = f"sides of {whose} lie {where} in each other at {place}, across what was a gap: "
     else:
         what = f"'{found.first}' lies {where} inside '{found.second}' at {place}: "
     if found.bared:
         return what + ("nothing keeps the sides apart that a stage has bared; a thin region that is removed can be "
                        "drawn as a crack with a law and its width as `gap`, which one stage closes and a later one "
                        "releases")
-    if found.first == found.second:
-        return what + ("nothing keeps them apart; draw them as curves of their own and add a table [contacts.NAME] "
-                       "between these if they are to touch")
+    if found.across:
+        return what + ("nothing keeps these curves apart; draw the sides as curves of their own, where they are not, "
+                       "and add a table [contacts.NAME] between them if they are to touch")
     return what + ("nothing keeps them apart, as they have no contact with each other; add a table [contacts.NAME] "
                    "between their curves if they are to touch")
 

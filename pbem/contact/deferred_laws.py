@@ -148,7 +148,8 @@ def _are_asked_alike(laws: PairLaws) -> bool:
 
 
 def _take_part(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState, pairs: Integer) -> Subset:
-    """What concerns some pairs (k,), of which those that follow others still do."""
+    """What concerns some pairs (k,), of which those that follow others still do: that alone is told by the leaders, as
+    those may not be among them."""
     part = take_subset(laws, memory, pressure, modes, pairs)
     here = np.arange(len(pairs))
     leader = np.where(laws.leader[pairs] == pairs, here, here - 1)

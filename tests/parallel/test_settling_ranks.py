@@ -12,6 +12,7 @@ import pytest
 from pbem.results.reader import Results, open_results
 from pbem.solve.nonlinear.newton import PATIENCE
 from pbem.solve.nonlinear.search import Search
+from tests.unit.test_open_blocks import FLOATS, write_blocks
 from tests.unit.test_sweeps import grow_branches
 from tests.verification.test_settling import make_junction, run, write_plane
 
@@ -112,8 +113,9 @@ def test_clusters_lead_to_the_same_on_all_ranks(tmp_path: Path, mpirun_snippet: 
         expect_the_same(results, alone)
 
 
-def test_smoothed_laws_lead_to_the_same_on_all_ranks(tmp_path: Path, mpirun_snippet: Launch) -> None:
-    (tmp_path / "network.toml").write_text(grow_branches(3, 5))
+@pytest.mark.parametrize("text", [grow_branches(3, 5), write_blocks(FLOATS)], ids=["branches", "a block that floats"])
+def test_smoothed_laws_lead_to_the_same_on_all_ranks(text: str, tmp_path: Path, mpirun_snippet: Launch) -> None:
+    (tmp_path / "network.toml").write_text(text)
     found = []
     for ranks in (1, 3):
         done = mpirun_snippet(ranks, SMOOTHED, f"{ranks}.h5", cwd=tmp_path)

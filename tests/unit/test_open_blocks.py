@@ -18,6 +18,7 @@ from pbem.solve.nonlinear.smooth_search import SmoothSearch
 from pbem.solve.problem.step import SilentReporter, Step
 from pbem.solve.steps.march import march
 from pbem.solve.tangent.krylov import KrylovTangent
+from tests.unit.test_clusters import move
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_sweeps import assemble, many_groups, write_network
 
@@ -225,6 +226,38 @@ def test_blocks_in_open_cracks_come_to_the_same_state_by_way_of_smoothed_laws(ma
     np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
     slip = usual.contact.slip
     np.testing.assert_allclose(found.contact.slip, slip, rtol=0, atol=1e-6 * np.abs(slip).max())
+
+
+# Under it one of the two blocks is held by nothing.
+FLOATS = "sxx = 0.58, syy = -0.16, sxy = 0.28"
+
+
+def test_a_block_that_floats_changes_nothing_away_from_it(
+    many_groups: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Against the search that holds it by single pairs, and wherever the model lies or how its curves run: elsewhere
+    the same; around it the tractions to the part of the mean that is left over on it."""
+    choose, anchored = OpenBlocks._choose_stiffness, []
+
+    def record(blocks: OpenBlocks, modes: ModeState) -> Any:
+        anchored.append(choose(blocks, modes))
+        return anchored[-1]
+
+    monkeypatch.setattr(OpenBlocks, "_choose_stiffness", record)
+    found = solve(write_blocks(FLOATS), True).contact
+    around = anchored[-1].anchored
+    assert anchored[-1].moving and 0 < around.sum() < len(around) / 2
+    elsewhere = solve(move(write_blocks(FLOATS), 1.0, 3e4 - 7e4j, False), True).contact
+    larger = solve(move(write_blocks(FLOATS), 1e3, 0j, False), True).contact
+    held = solve(write_blocks(FLOATS), False).contact
+    mean = float(np.hypot(found.traction_n, found.traction_s).mean())
+    for other, unit, near in ((elsewhere, 1.0, 1e-8), (larger, 1e3, 1e-8), (held, 1.0, 1e-4)):
+        np.testing.assert_array_equal(found.mode[~around], other.mode[~around])
+        for name in ("slip", "opening", "traction_n", "traction_s"):
+            one, two = getattr(found, name), getattr(other, name) * (unit if "traction" in name else 1 / unit)
+            np.testing.assert_allclose(one[~around], two[~around], rtol=0, atol=near * np.abs(one).max())
+            if "traction" in name:
+                np.testing.assert_allclose(one, two, rtol=0, atol=10 * FLOATING * mean)
 
 
 def test_what_is_tried_again_with_more_stiffness_is_told(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,10 @@ import pbem
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import list_faces
+from pbem.parallel import world
+from pbem.solve.steps import step_notes
 from pbem.solve.steps.closed_gaps import find_closed_gap
+from pbem.solve.steps.passing import Passing
 from tests.verification.test_open_faces import DEPTH, SilentReporter
 
 
@@ -158,3 +163,24 @@ def test_thin_arms_are_told_by_what_they_come_to_lie_in_each_other(bodies: int, 
     match = re.search(r"(sides of 'body'|'[ab]') lies? (\S+) deep", note)
     assert match is not None and closing > 0.3
     np.testing.assert_allclose(float(match[2]), closing - 0.2, rtol=0.03)
+
+
+def test_what_is_less_deep_is_told_of_other_bodies_than_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each two have a depth of their own, from which on they are told again; found in both ways they are told once."""
+    listener, noted = Noting(), {}
+    problem: Any = SimpleNamespace(model=None, mesh=SimpleNamespace(nodes=0), comm=world)
+
+    def step(number: int, *found: Passing | None) -> None:
+        nonlocal noted
+        monkeypatch.setattr(step_notes, "find_passing", lambda *_: found[0])
+        monkeypatch.setattr(step_notes, "find_closed_gap", lambda *_: found[1])
+        now: Any = SimpleNamespace(number=number, displacement=np.zeros(0))
+        noted = step_notes.note_passing(problem, now, noted, listener)
+
+    step(1, Passing("a", "b", 1.0, 0j), None)
+    step(2, Passing("a", "b", 1.5, 0j), Passing("b", "b", 0.1, 0j, across=True))
+    step(3, Passing("a", "b", 1.9, 0j), Passing("b", "a", 2.1, 0j, across=True))
+    step(4, Passing("a", "b", 2.1, 0j), Passing("b", "b", 0.19, 0j, across=True))
+    told = [(note.split(":")[0], "sides" in note) for note in listener.notes]
+    assert told == [("Step 1", False), ("Step 2", True), ("Step 3", True)]
+    assert noted == {("a", "b"): 2.1, ("b", "b"): 0.1}

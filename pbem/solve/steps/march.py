@@ -108,8 +108,9 @@ def march(
     begin = start or start_from_rest(problem)
     arranged, whole = Arranged(problem, kept), problem
     number, memory, contact = begin.number, begin.memory, begin.contact
-    noted, told, depth = 0.0, 0.0, 0.0
+    noted, told = 0.0, 0.0
     pushed: Mapping[str, float] = {}
+    passed: Mapping[tuple[str, str], float] = {}
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
@@ -134,7 +135,7 @@ def march(
                 step = replace(step, ahead=describe_ceiling(ceiling))
                 noted = note_imbalance(problem, step, noted, reporter)
                 told = note_nonlinearity(problem, step, told, reporter)
-                depth = note_passing(problem, step, depth, reporter)
+                passed = note_passing(problem, step, passed, reporter)
                 pushed = note_pushed(problem, step, pushed, reporter)
                 contact = step.contact
                 with note_place(step, solution.modes):

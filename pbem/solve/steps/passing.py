@@ -29,6 +29,11 @@ class Passing:
     across: bool = False
     bared: bool = False
 
+    @property
+    def names(self) -> tuple[str, str]:
+        """Of the bodies, in the order of the alphabet."""
+        return min(self.first, self.second), max(self.first, self.second)
+
 
 def find_passing(model: Model, mesh: Mesh, displacement: Complex) -> Passing | None:
     """The deepest place where a body has come to lie inside of another one without a contact between them.

@@ -49,21 +49,25 @@ def note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Repo
     return noted
 
 
-def note_passing(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
-    """Note bodies that have moved into each other, or sides of one across a gap, if twice as deep as was noted before;
-    returns what is noted now."""
+def note_passing(
+    problem: Problem, step: Step, noted: Mapping[tuple[str, str], float], reporter: Reporter
+) -> Mapping[tuple[str, str], float]:
+    """Note bodies that have moved into each other, and sides across a gap, if twice as deep as was noted of the same
+    two before; returns the depths by the names of both that are noted now."""
     model, mesh = problem.model, problem.mesh
 
-    def find() -> Passing | None:
+    def find() -> list[Passing]:
         found = (find_passing(model, mesh, step.displacement[: mesh.nodes]),
                  find_closed_gap(model, mesh, step.displacement))
-        return max((each for each in found if each is not None), key=lambda each: each.depth, default=None)
+        deepest = sorted((each for each in found if each is not None), key=lambda each: -each.depth)
+        # What lies in another body across a gap is found in both ways.
+        return [each for k, each in enumerate(deepest) if each.names not in [other.names for other in deepest[:k]]]
 
     found = do_on_first(problem.comm, ConvergenceError, find)
-    if found is None or found.depth <= 2 * noted:
-        return noted
-    reporter.note(f"Step {step.number}: {describe_passing(found)}.")
-    return found.depth
+    new = [each for each in found if each.depth > 2 * noted.get(each.names, 0.0)]
+    for each in new:
+        reporter.note(f"Step {step.number}: {describe_passing(each)}.")
+    return {**noted, **{each.names: each.depth for each in new}}
 
 
 def note_pushed(problem: Problem, step: Step, noted: Mapping[str, float], reporter: Reporter) -> Mapping[str, float]:

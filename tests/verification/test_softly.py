@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
-from pbem.contact.laws import SLIP, STICK, commit, start_memory
+from pbem.contact.laws import SLIP, STICK, ModeState, commit, start_memory
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
+from pbem.solve.nonlinear import pivoted_group
 from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.nonlinear.search import Search
 from pbem.solve.steps import softly as softly_module
 from pbem.solve.steps.softly import SOFTNESS, soften, solve_softly
 from pbem.solve.system.assembly import assemble_problem
@@ -108,3 +112,21 @@ def test_softer_contacts_are_tried_where_dashpots_cannot_tell_of_pairs_without_m
         assert isinstance(found, Solution) == (not restless if damps else not hurried)
     told = "damping" if damps else "compliance"
     assert any(f"{told} of the contacts" in note for note in listener.notes) == (damps or not hurried)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_the_end_of_a_search_tells_that_dashpots_were_asked(free: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where it is that a body may move freely, which is found on the way: they would be asked a second time."""
+    unsettled, moving = ConvergenceError("mode cycle", "of these"), ConvergenceError("free motion", "of a body")
+
+    def doubt(*_: object) -> None:
+        if free:
+            raise moving
+
+    monkeypatch.setattr(pivoted_group, "describe_unsettled", lambda *_: unsettled)
+    problem = SimpleNamespace(decide=lambda describe: describe(), laws=SimpleNamespace(count=1))
+    hold: Any = SimpleNamespace(problem=problem, load=None, doubt_free_motion=doubt, describe_floating=lambda _: None)
+    search, modes, proposal = Search(50), ModeState(np.zeros(1, dtype=np.int8), np.ones(1)), SimpleNamespace(modes=None)
+    search.restless = True
+    found = pivoted_group.end_search(hold, "mode cycle", modes, proposal, search)  # type: ignore[arg-type]
+    assert found is (moving if free else unsettled) and found.restless

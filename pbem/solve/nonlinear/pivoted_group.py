@@ -43,7 +43,10 @@ def end_search(hold: Hold, reason: str, modes: ModeState, proposal: Proposal, se
         hold.doubt_free_motion(proposal.modes, error)
         return hold.describe_floating(proposal.modes) or error
 
-    error = hold.problem.decide(describe)
+    try:
+        error = hold.problem.decide(describe)
+    except ConvergenceError as free:
+        error = free
     error.restless = search.restless
     return error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isclose
 
 import numpy as np
 
@@ -73,10 +74,11 @@ class Ceiling:
         """With a try that failed; balanced: up to the target, which it is if all of it may be in balance.
 
         Where it had been found free and fails for another reason from nearer, it is not known to be free any more. What
-        fails below it for another reason says nothing of that.
+        fails at another fraction for another reason says nothing of that.
         """
         collapsed = error.reason == "free motion" or (error.reason == "limit load" and balanced >= target)
-        free = self.free if self.free != target else np.inf
+        # The same fraction may come by another sum.
+        free = np.inf if isclose(self.free, target) else self.free
         return Ceiling(
             min(self.failed, target), min(free, target if collapsed else np.inf),
             min(self.balanced, balanced if balanced < target else np.inf), target, error,

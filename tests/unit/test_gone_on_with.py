@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import pbem
+from pbem.contact.loads import Load
+from pbem.contact.modes import Linearisation
 from pbem.solve.preconditioner import schwarz
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.step import Iteration, SilentReporter
+from pbem.solve.tangent.krylov import KrylovTangent
+from tests.identities.solving import linearise_pairs
+from tests.unit.test_nearby import draw_modes
+from tests.unit.test_sweeps import assemble, write_network
+
+Real = NDArray[np.float64]
 
 
 def write_layers(count: int, elements: int, shear: float, order: int = 1) -> str:
@@ -70,3 +80,30 @@ def test_an_operator_that_stays_is_solved_by_what_is_known(small_groups: None, t
         for field in ("traction_n", "traction_s"):
             expected, value = getattr(contact, field)[-1], getattr(found.contact[name], field)[-1]
             np.testing.assert_allclose(value, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_another_operator_is_known_by_its_columns_and_by_the_anchors_that_act() -> None:
+    """Not by what is given: loads, and the laws' offsets. To the last bit, as the directions are one operator's."""
+    problem = assemble(write_network(2, 4))
+    tangent, count = problem.make_tangent(), problem.laws.count
+    assert isinstance(tangent, KrylovTangent)
+    law = linearise_pairs(problem, draw_modes(count), -1.0).store()
+    half, whole = problem.evaluate_load(0, 0.5), problem.evaluate_load(0, 1.0)
+    released = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 2)))[0]
+
+    def take(law: Linearisation, load: Load, released: Real | None = None) -> bool:
+        return tangent.product.take_map(replace(problem.constrain(law, load), released=released))
+
+    take(law, half)
+    assert not take(law, half)
+    assert not take(replace(law, offset=law.offset + 1.0), whole)
+    slope = law.tangent.copy()
+    largest = np.unravel_index(np.abs(slope).argmax(), slope.shape)
+    slope[largest] = np.nextafter(slope[largest], np.inf)
+    assert take(replace(law, tangent=slope), whole)
+    assert not take(replace(law, tangent=slope), half)
+    for one, another in ((released, None), (released[::-1], released), (released[:, :1], released[:, :1].copy())):
+        take(law, whole, one)
+        assert not take(law, whole, None if one is None else one.copy())
+        assert take(law, whole, another) != np.array_equal(one, another)
+    tangent.destroy()

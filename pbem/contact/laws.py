@@ -6,7 +6,7 @@ adds an elastic jump, compliance times traction, in front of its law; what is le
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -32,7 +32,7 @@ from pbem.contact.leaders import find_leaders
 from pbem.contact.strength import choose_strength
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model
-from pbem.model.varying import Places, Value, Varying
+from pbem.model.varying import Places, Value, spread_values
 from pbem.uniform import fold_uniform, repeat_value
 
 Modes = NDArray[np.int8]
@@ -130,6 +130,10 @@ class PairState:
     def take(self, pairs: Integer) -> PairState:
         """The state of some pairs (k,)."""
         return PairState(*(values[pairs] for values in vars(self).values()))
+
+    def choose(self, other: PairState, taken: Bool) -> PairState:
+        """The state, with that of another one where pairs (m,) are taken from it."""
+        return PairState(*(np.where(taken, vars(other)[name], own) for name, own in vars(self).items()))
 
     def approach(self, other: PairState, part: float) -> PairState:
         """The state at a part of the way to another one."""
@@ -252,16 +256,6 @@ def _group_strengths(
             values = {name: fold_uniform(each) for name, each in values.items()}
         groups.append(StrengthGroup(function, pairs, values))
     return tuple(groups)
-
-
-def spread_values(values: Sequence[Value], owner: Integer, places: Places) -> Real:
-    """The values of owners, such as interfaces, at places (k,) that each have one."""
-    numbers = np.array([0.0 if isinstance(value, Varying) else value for value in values] or [0.0], dtype=float)
-    result = np.asarray(numbers[owner])
-    for value in {value for value in values if isinstance(value, Varying)}:
-        own = np.flatnonzero(np.array([each == value for each in values])[owner])
-        result[own] = value.evaluate(places.take(own))
-    return result
 
 
 def find_effective(laws: PairLaws, p_n: Real, pressure: Real) -> Real:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Complex, Integer, Real
 from pbem.geometry.expression import evaluate_expression, list_names
 
 
@@ -112,3 +112,13 @@ def blend(before: Value, after: Value, places: Places, moment: Moment) -> Real:
         return after.evaluate(places, moment.now)
     first = evaluate(before, places, moment.start)
     return first + moment.factor * (evaluate(after, places, moment.now) - first)
+
+
+def spread_values(values: Sequence[Value], owner: Integer, places: Places) -> Real:
+    """The values of owners, such as interfaces, at places (k,) that each have one."""
+    numbers = np.array([0.0 if isinstance(value, Varying) else value for value in values] or [0.0], dtype=float)
+    result = np.asarray(numbers[owner])
+    for value in {value for value in values if isinstance(value, Varying)}:
+        own = np.flatnonzero(np.array([each == value for each in values])[owner])
+        result[own] = value.evaluate(places.take(own))
+    return result

@@ -8,8 +8,6 @@ whole model is solved for again. It goes on as long as fewer and fewer pairs cha
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
@@ -82,7 +80,7 @@ class ClusterSearch:
 
         def find(pairs: Integer, stiffness: Real) -> Real | None:
             contact = take_cluster(problem, memory, load, self._smooth, exact, pairs, stiffness)
-            near = contact.narrow(take_pairs(state, pairs), self._shape[pairs], last)
+            near = contact.narrow(state.take(pairs), self._shape[pairs], last)
             part = contact.subset
             found = near and contact.end(near, lambda at, now: judge(part.laws, at, now, part.memory, part.pressure))
             return np.column_stack([found[0].mode, found[0].sign, stack_states(found[1])]) if found else None
@@ -92,7 +90,7 @@ class ClusterSearch:
         if not settled.any() or chosen.fingerprint() == modes.fingerprint():
             return None
         search.swept = True
-        state = put_states(state, values[:, 2:], settled)
+        state = state.choose(PairState(*values[:, 2:].T), settled)
         tangent.expect(stack_states(state))
         return chosen, state, settled
 
@@ -114,21 +112,9 @@ def take_cluster(
     """The contact of some pairs (k,) with a stiffness (2 k, 2 k) that acts on a state of all pairs (m,)."""
     modes = ModeState(np.zeros(problem.laws.count, dtype=np.int8), np.ones(problem.laws.count))
     subset = take_subset(problem.laws, memory, load.pressure, modes, pairs)
-    return ClusterContact(subset, smooth[pairs], stiffness, take_pairs(exact, pairs), problem.traction_scale)
-
-
-def take_pairs(state: PairState, pairs: Integer) -> PairState:
-    """The state of some pairs (k,)."""
-    return PairState(*(values[pairs] for values in vars(state).values()))
+    return ClusterContact(subset, smooth[pairs], stiffness, exact.take(pairs), problem.traction_scale)
 
 
 def stack_states(state: PairState) -> Real:
     """p_n, p_s, g_n, g_s of k pairs as an array (k, 4)."""
     return np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
-
-
-def put_states(state: PairState, values: Real, chosen: Bool) -> PairState:
-    """The state with values (m, 4) in place of the chosen pairs' (m,)."""
-    names = ("p_n", "p_s", "g_n", "g_s")
-    return replace(state, **{name: np.where(chosen, values[:, k], getattr(state, name))
-                             for k, name in enumerate(names)})

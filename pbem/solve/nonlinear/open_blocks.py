@@ -84,20 +84,15 @@ class OpenBlocks:
         """
         if self.state is None:
             return
-        self._refer(state, self._stiffness.anchored & (not calm))
+        self.state = self.state.choose(state, ~self._stiffness.anchored | calm)
         self.renewed = calm
         self.driven = driven if calm else self.driven | driven
         self.fallen *= FALL if calm and self.fallen > self.least else 1.0
 
-    def _refer(self, state: PairState, stays: Bool) -> None:
-        """Let the jumps of a state be what the stiffness acts from, but of pairs (m,) that stay."""
-        if self.state is not None:
-            self.state = PairState(*(np.where(stays, old, new) for old, new in zip(
-                vars(self.state).values(), vars(state).values(), strict=True)))
-
     def settle(self, state: PairState, settled: Bool) -> None:
         """Take note of a state in which clusters of pairs (m,) settled by themselves: these are anchored there anew."""
-        self._refer(state, self._stiffness.anchored & ~settled)
+        if self.state is not None:
+            self.state = self.state.choose(state, ~self._stiffness.anchored | settled)
 
     def stiffen_again(self, error: ConvergenceError) -> bool:
         """After an error: whether it is of a system that could not be solved with so little stiffness, of which there

@@ -35,7 +35,7 @@ from pbem.contact.smoothed import (
     take_off_proximal,
 )
 from pbem.errors import ConvergenceError
-from pbem.solve.nonlinear.cluster_search import ClusterSearch, put_states, stack_states, take_cluster, take_pairs
+from pbem.solve.nonlinear.cluster_search import ClusterSearch, stack_states, take_cluster
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.recorded import Record
@@ -239,11 +239,11 @@ class SmoothSearch:
         def settle(pairs: Integer, stiffness: Real) -> Real | None:
             contact = take_cluster(problem, self._memory, self._load, self.smooth, exact, pairs, stiffness)
             own = PROXIMAL * problem.laws.own_stiffness[pairs]
-            found = contact.settle_smoothed(take_pairs(state, pairs), widths[pairs], own)
+            found = contact.settle_smoothed(state.take(pairs), widths[pairs], own)
             return None if found is None else stack_states(found)
 
         values, settled = clusters.solve(far, 4, settle)
-        state = put_states(state, values, settled)
+        state = state.choose(PairState(*values.T), settled)
         return state, problem.decide(lambda: self._measure_off(state, width))
 
     def _start(self, modes: ModeState, alone: bool) -> SmoothCourse:

@@ -32,8 +32,8 @@ SOFTEST = 1e-4
 STEADY, IN_TURN = 0.05, 2
 # What open faces come nearer by, of the largest motion, that is none.
 APPROACH = 1e-6
-# Problems of contact at most, of so many pairs, as in pbem.contact.running; of more pairs fewer. Friction that changes
-# with slip is taken at the slips of the problem before, in one instant so often at most.
+# Problems of contact of a schedule at most, of so many pairs, as in pbem.contact.running; of more pairs fewer. Friction
+# that changes with slip is taken at the slips of the problem before, in one instant so often at most.
 MOST_SOLVED, OF_PAIRS, MOST_TAKEN = 1000, 100, 100
 # Newton's steps of an instant before it is pivoted: those that lead to its modes are few.
 MOST_STEPS = 25
@@ -72,8 +72,8 @@ def come_to_rest(
     if not _is_sound(subset, _damp(response, SOFTEST * own, response.values[:, 2:])):
         return Damped(None, None, 0)
     runs: ModeState | None = None
-    left = round(MOST_SOLVED * min(OF_PAIRS / subset.laws.count, 1.0) ** 2)
     for first, part, most in SCHEDULES:
+        left = round(MOST_SOLVED * min(OF_PAIRS / subset.laws.count, 1.0) ** 2)
         stiffness, motion, steady, lacking = first * own, np.zeros_like(before), 0, 0
         modes, present, jumps = subset.modes, response, before / response.length_unit
         for _ in range(most):

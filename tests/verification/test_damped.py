@@ -148,6 +148,17 @@ CURVES = (
 )  # fmt: skip
 
 
+
+def test_what_moves_on_quickly_leaves_room_to_follow_it_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond the largest push of 0.3: friction that weakens takes 19 problems with quick dashpots, 53 with slow ones.
+    """
+    monkeypatch.setattr("pbem.contact.damped.MOST_SOLVED", 60)
+    found, _, moves = push(0.4, {"friction": 0.3, "friction_dynamic": 0.2, "slip_distance": 0.01})
+    assert found.rest is None
+    assert found.runs is not None
+    assert "translation" in moves
+
+
 @pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (1, 2, 0)])
 def test_pairs_that_stay_as_they_are_are_not_asked(order: tuple[int, ...]) -> None:
     """A block of two that are bonded, over a slit that never closes, slides at the push that friction can balance."""

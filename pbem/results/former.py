@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from pbem.arrays import Integer
-from pbem.results.layout import count_steps, to_columns
+from pbem.results.layout import count_steps
 from pbem.solve.problem.step import Former, Step
 
 GROUP = "former"
@@ -25,7 +25,7 @@ def write_former(file: h5py.File, before: Step | None, step: Step, pairs: Intege
     number = file["steps/number"]
     if step.ahead:
         group = file.require_group(GROUP)
-        group.attrs["ahead"] = json.dumps({"number": step.number, **_list_places(step.ahead)})
+        group.attrs["ahead"] = json.dumps({"number": step.number, **step.ahead})
     if before is None or before.stage != step.stage or (len(number) and int(number[-1]) == before.number):
         return
     group = file.require_group(GROUP)
@@ -38,16 +38,7 @@ def read_ahead(file: h5py.File, number: int) -> Mapping[str, Any]:
     if GROUP not in file or "ahead" not in file[GROUP].attrs:
         return {}
     told = json.loads(str(file[GROUP].attrs["ahead"]))
-    if told.pop("number") != number:
-        return {}
-    if told["error"]:
-        told["error"]["places"] = np.array(told["error"]["places"]).reshape(-1, 2) @ np.array([1, 1j])
-    return dict(told)
-
-
-def _list_places(ahead: Mapping[str, Any]) -> Mapping[str, Any]:
-    error = ahead["error"]
-    return {**ahead, "error": error and {**error, "places": to_columns(error["places"]).tolist()}}
+    return dict(told) if told.pop("number") == number else {}
 
 
 def read_former(file: h5py.File, pairs: Integer) -> Former | None:

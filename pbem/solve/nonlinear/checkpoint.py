@@ -21,8 +21,10 @@ from pbem.contact.modes import Linearisation, begin_slip
 from pbem.contact.separating import begin_jump
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
+from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.smooth_search import SmoothCourse, Width
+from pbem.solve.nonlinear.unsettled import Unsettled
 from pbem.solve.problem.step import Iteration, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
 
@@ -150,11 +152,31 @@ def from_plain(value: Any) -> Any:
 
 
 def describe_error(error: ConvergenceError) -> Plain:
-    """The reason of a try that failed, as plain data."""
-    return {"reason": error.reason, "detail": error.detail,
-            "places": np.array(error.places, dtype=complex)}
+    """The reason of a try that failed, with all that is decided from it later: numbers, texts and lists of them."""
+    return {"reason": error.reason, "detail": error.detail, "places": [[z.real, z.imag] for z in error.places],
+            "restless": error.restless, "unless": error.unless and _describe_unsettled(error.unless)}
 
 
 def recall_error(told: Plain) -> ConvergenceError:
-    """See `describe_error`."""
-    return ConvergenceError(told["reason"], told["detail"], tuple(told["places"].tolist()))
+    """See `describe_error`; files of earlier versions have less."""
+    places = np.asarray(told["places"])
+    points = places if np.iscomplexobj(places) else places.reshape(-1, 2) @ np.array([1, 1j])
+    unless = told.get("unless")
+    return ConvergenceError(told["reason"], told["detail"], tuple(points.tolist()),
+                            unless and _recall_unsettled(unless), told.get("restless", False))
+
+
+def _describe_unsettled(unless: Unsettled) -> Plain:
+    motions = [{"regions": list(motion.regions), "text": motion.text, "velocities": [
+        [name, shift.real, shift.imag, turn] for name, (shift, turn) in motion.velocities.items()
+    ]} for motion in unless.motions]
+    return {"error": unless.error and describe_error(unless.error), "motions": motions, "may_stick": unless.may_stick}
+
+
+def _recall_unsettled(told: Plain) -> Unsettled:
+    motions = tuple(
+        RigidBodyMode(tuple(motion["regions"]),
+                      {name: (complex(x, y), turn) for name, x, y, turn in motion["velocities"]}, motion["text"])
+        for motion in told["motions"]
+    )
+    return Unsettled(told["error"] and recall_error(told["error"]), motions, told["may_stick"])

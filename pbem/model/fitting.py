@@ -167,7 +167,7 @@ def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve], loaded:
     named = [f"'{name}' {old[name]} to {new[name]}" for name in added]
     near = "near other faces or point loads" if loaded else "near other faces"
     return [
-        f"Elements added {near}, in narrow wedges, beside crack tips or where cracks turn, "
+        f"Elements added {near}, in narrow wedges, beside crack tips or rounded corners or where cracks turn, "
         f"{sum(old.values())} to {sum(new.values())} in all: {list_names(named, MOST_NAMED)}."
     ]
 
@@ -197,6 +197,7 @@ def _note_long(long: Sequence[LongElement]) -> list[str]:
     if not named:
         return []
     return [
-        "Elements are longer than the distance to other faces allows, as their grading was given: "
+        "Elements are longer than the distance to other faces allows, or the radius of a rounded corner, as their "
+        "grading was given: "
         f"{list_names(named, MOST_NAMED)}. Results may be wrong there; grading = \"auto\" adds elements."
     ]

@@ -13,6 +13,7 @@ from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Curve
 from pbem.geometry.nearness import Distances, Surroundings
 from pbem.geometry.tolerance import TIE
+from pbem.model.roundings import BEARABLE, find_roundings, join_legs
 from pbem.model.sliver import Reach, Wedges
 
 # Longest element, as a multiple of the distance to the next face, by the order of the polynomials. Measured by pairs
@@ -141,6 +142,8 @@ class LengthField:
                 self.refined[number] &= self._floor[number] == 0
                 self._ends[number] = leg.divide(leg.elements, *self.refined[number])
         self._component = _connect(surroundings, tips)
+        longest = np.array([np.diff(ends).max() for ends in self._ends]) * self.length
+        self._roundings = find_roundings(legs, longest, order)
         self._tips, self._at_tip = self._collect_tips(tips)
         self._loads = [(np.array([name in around for name in surroundings.curve], dtype=bool) & ~self.kept,
                         cKDTree(np.column_stack([at.real, at.imag]))) for around, at in loads]
@@ -184,17 +187,26 @@ class LengthField:
             corner |= touches & (floor > 0) & (length <= floor)
         allowed = np.where(corner, length, allowed)
         beside_tips = self._measure_from_tips(points, near.tips)
+        beside_arcs = self._roundings.measure(legs, points, cells.wanted)
         steepest = max(self.reach.usual, GROWTH, SLOPE, LOADED)
-        allowed = np.minimum(allowed, beside_tips)
+        allowed = np.minimum(allowed, np.minimum(beside_tips, np.where(self.kept[legs], np.inf, beside_arcs)))
         final = (length <= FINENESS * allowed) | corner
         final |= allowed - 0.5 * steepest * length >= (1 - TIE) * cells.wanted
         return Measured(allowed, final, distance, distances.leg, near)
 
     def measure_by_distance(self, cells: Cells) -> Real:
-        """Lengths (k,) that the distance of other faces allows in the middle of cells, whosever their grading is."""
+        """Lengths (k,) that the distance of other faces allows in the middle of cells, whosever their grading is; and
+        rounded corners those next to them on legs that are not refined there."""
         sight = cells.wanted / self._least_reach * (1 + 1e-9)
         t = 0.5 * (cells.low + cells.high)
-        return self._allow(self.surroundings.find_distances(cells.leg, t, self.place(cells), sight))
+        allowed = self._allow(self.surroundings.find_distances(cells.leg, t, self.place(cells), sight))
+        for k, touches in enumerate((cells.low == 0, cells.high == 1)):
+            own = np.flatnonzero(touches & ~self.refined[cells.leg, k])
+            legs = [self.surroundings.legs[number] for number in cells.leg[own].tolist()]
+            points = np.array([leg.end if k else leg.start for leg in legs], dtype=complex)
+            beside = self._roundings.measure(cells.leg[own], points, cells.wanted[own])
+            allowed[own] = np.minimum(allowed[own], BEARABLE * beside)
+        return allowed
 
     def _allow(self, distances: Distances) -> Real:
         """Lengths (k,) at distances from other faces: the least that any of them allows, not only the nearest one, so
@@ -282,23 +294,10 @@ class LengthField:
 
 def _connect(surroundings: Surroundings, tips: Mapping[str, tuple[bool, bool]]) -> Integer:
     """Per leg the number of the connected set of cracks that it belongs to, -1 if it is no crack."""
-    parent: dict[complex, complex] = {}
-
-    def find(point: complex) -> complex:
-        parent.setdefault(point, point)
-        while parent[point] != point:
-            parent[point] = parent[parent[point]]
-            point = parent[point]
-        return point
-
-    joined = list(zip(surroundings.legs, surroundings.curve, strict=True))
-    for leg, name in joined:
-        if name in tips:
-            parent[find(leg.start)] = find(leg.end)
-    numbers: dict[complex, int] = {}
-    return np.array([
-        numbers.setdefault(find(leg.start), len(numbers)) if name in tips else -1 for leg, name in joined
-    ], dtype=np.int64)  # fmt: skip
+    crack = np.array([name in tips for name in surroundings.curve], dtype=bool)
+    component = np.full(len(crack), -1, dtype=np.int64)
+    component[crack] = join_legs([surroundings.legs[number] for number in np.flatnonzero(crack).tolist()])
+    return component
 
 
 def count_elements(curves: Mapping[str, Curve]) -> dict[str, int]:

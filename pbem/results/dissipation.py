@@ -22,6 +22,7 @@ from pbem.contact.laws import (
     start_memory,
 )
 from pbem.solve.problem.step import ContactState
+from pbem.uniform import fold_uniform
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,11 @@ def record_pairs_at_rest(laws: PairLaws, p_n: Real, p_s: Real, opening: Bool | N
     p_s = np.where((laws.compliance_s > 0) & (laws.at_rest_s == 0) & loaded, 0.0, p_s)
     zeros = np.zeros(laws.count)
     bond = np.where(laws.at_rest_n != 0, measure_stiffening(laws, p_n, zeros), 0.0)
-    return PairRecord(
-        memory.modes.mode, p_n, p_s, laws.gap, zeros, laws.gap - laws.at_rest_n, -laws.at_rest_s, zeros,
-        memory.internal, bond,
-    )  # fmt: skip
+    # It is kept through the run, and most of it is the same at all pairs.
+    p_n, p_s, zeros, bond, parted, slid = (
+        fold_uniform(each) for each in (p_n, p_s, zeros, bond, laws.gap - laws.at_rest_n, -laws.at_rest_s))
+    internal = {name: fold_uniform(values) for name, values in memory.internal.items()}
+    return PairRecord(memory.modes.mode, p_n, p_s, laws.gap, zeros, parted, slid, zeros, internal, bond)
 
 
 def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairRecord:

@@ -33,7 +33,7 @@ import numpy as np
 from pbem.arrays import Complex, Real
 from pbem.contact.constraints import evaluate_fluid
 from pbem.contact.laws import PairLaws
-from pbem.mesh.mesh import Faces, Mesh
+from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.results.dissipation import PairWork, measure_work
 from pbem.results.runaway import Runaway
@@ -76,12 +76,11 @@ class EnergyBalance:
     """
 
     def __init__(
-        self, model: Model, mesh: Mesh, last: Step | None = None, reached: Energy | None = None,
-        faces: Faces | None = None,
+        self, model: Model, mesh: Mesh, last: Step | None = None, reached: Energy | None = None
     ) -> None:
-        """Begins at rest, or after the step `last` with the energies that were reached by then; faces: of the mesh."""
+        """Begins at rest, or after the step `last` with the energies that were reached by then."""
         self._model, self._mesh = model, mesh
-        self._stored = StoredEnergy(model, mesh, faces)
+        self._stored = StoredEnergy(model, mesh)
         self._reached = reached or Energy(0.0, 0.0, 0.0)
         self.runaway: Runaway | None = None
         self._last = last

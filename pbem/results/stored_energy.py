@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -36,28 +37,54 @@ _Particulars = list[tuple[ParticularSolution, ParticularSolution]]
 _Fields = tuple[Complex, Complex, Real]
 
 
+class _Sides:
+    """All faces (f,) of a mesh, and those of its regions, listed when they are first asked for.
+
+    Made anew for each step: all that the writer keeps is held on the first rank beside its share of the matrices.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+
+    @cached_property
+    def faces(self) -> Faces:
+        return list_faces(self._mesh)
+
+    @cached_property
+    def _by_region(self) -> tuple[Integer, Integer]:
+        order = np.argsort(self.faces.region, kind="stable")
+        numbers = np.arange(len(self._mesh.region_names) + 1)
+        return order, np.searchsorted(self.faces.region[order], numbers)
+
+    def find(self, region: int) -> Integer:
+        """Those (k,) of a region."""
+        order, bounds = self._by_region
+        return order[bounds[region]:bounds[region + 1]]
+
+
 @dataclass(frozen=True)
 class _Reference:
-    """Fields (c,) of unit forces or unit stresses in one region about a center: its faces (k,) among all (f,), and the
+    """Fields (c,) of unit forces or unit stresses in one region, by its number, about a center, and the
     integral (c,) of the displacement over a finite region. at_points (c, l): what they move the model's point loads by,
     3 numbers each; 0 for those of other regions."""
 
-    faces: Integer
-    all_faces: Faces
+    region: int
     fields: tuple[ParticularSolution, ...]
     center: complex
     integral: Complex
     at_points: Real
 
-    def conjugate(self, weight: Real, traction: Complex, displacement: Complex, point_forces: Real) -> Real:
+    def conjugate(
+        self, sides: _Sides, weight: Real, traction: Complex, displacement: Complex, point_forces: Real
+    ) -> Real:
         """Betti's sum (c,) for the field with tractions and displacements on all faces (f,); point_forces (l,).
 
         The unit fields are evaluated anew, some faces at a time: stored they would be most of what the writer holds.
         """
-        on_faces = np.zeros(len(self.fields))
-        for begin in range(0, len(self.faces), SUMMED):
-            at = self.faces[begin:begin + SUMMED]
-            z, n = self.all_faces.position[at] - self.center, self.all_faces.normal[at]
+        on_faces, own = np.zeros(len(self.fields)), sides.find(self.region)
+        for begin in range(0, len(own), SUMMED):
+            at = own[begin:begin + SUMMED]
+            z, n = sides.faces.position[at] - self.center, sides.faces.normal[at]
             w, t, u = weight[at], traction[at], displacement[at]
             for k, field in enumerate(self.fields):
                 on_faces[k] += (w * (t * np.conj(field.displacement(z)) - np.conj(field.traction(z, n)) * u)).real.sum()
@@ -97,26 +124,25 @@ class StoredEnergy:
     weight (f,): of the faces that are there, 0 of others.
     """
 
-    def __init__(self, model: Model, mesh: Mesh, faces: Faces | None = None) -> None:
-        """Begins with all that the model has; `arrange` goes to a stage. faces: of the mesh, where they are known."""
+    def __init__(self, model: Model, mesh: Mesh) -> None:
+        """Begins with all that the model has; `arrange` goes to a stage."""
         self._model, self._mesh = model, mesh
         self.laws = collect_laws(model, mesh)
         self.outer = collect_outer_nodes(model, mesh)
         self._all_weight = self.weight = weigh_faces(mesh)
         self.there: Arrangement | None = None
-        self._faces = faces or list_faces(mesh)
-        self._by_region = np.argsort(self._faces.region, kind="stable")
-        self._bounds = np.searchsorted(self._faces.region[self._by_region], np.arange(len(model.regions) + 1))
+        sides = _Sides(mesh)
         self._forces = [
-            self._refer(number, [ParticularSolution(each.material, force=force) for force in (1, 1j)], within=True)
+            self._refer(
+                sides, number, [ParticularSolution(each.material, force=force) for force in (1, 1j)], within=True)
             for number, each in enumerate(model.regions) if each.material.density and not each.infinite
         ]  # fmt: skip
         self._stresses = [
-            self._refer(number, [ParticularSolution(each.material, remote=stress) for stress in UNIT_STRESSES])
+            self._refer(sides, number, [ParticularSolution(each.material, remote=stress) for stress in UNIT_STRESSES])
             for number, each in enumerate(model.regions) if each.infinite
         ]  # fmt: skip
-        self._is_tool = np.array([each.rigid for each in model.regions])[self._faces.region]
-        self._in_situ = self._sample_in_situ()
+        self._is_tool = np.array([each.rigid for each in model.regions])[sides.faces.region]
+        self._in_situ = self._sample_in_situ(sides)
         first = find_arrangement(model, mesh, self.outer, 0)
         self._pairs_at_rest = record_pairs_at_rest(
             self.laws, *bear_in_situ(model, mesh)[:2], opening=None if first is None else first.opening)
@@ -156,7 +182,7 @@ class StoredEnergy:
         self.there = find_arrangement(self._model, self._mesh, self.outer, stage)
         self.weight = self._all_weight
         if self.there is not None:
-            self.weight = np.where(self.there.regions[self._faces.region], 0.0, self._all_weight)
+            self.weight = np.where(self.there.regions[list_faces(self._mesh).region], 0.0, self._all_weight)
 
     def describe_rest(self) -> EnergyState:
         nothing = repeat_value(0.0, len(self.weight), complex)
@@ -171,14 +197,14 @@ class StoredEnergy:
         self, traction: Complex, displacement: Complex, stage: int, factor: float, pairs: PairRecord
     ) -> EnergyState:
         """The energy that is stored, and what weights and far stresses work on (theory, 73, 74)."""
-        particulars = evaluate_particular_solutions(self._model, stage, factor)
-        swollen = self._sample_swelling([balanced for balanced, _ in particulars])
+        particulars, sides = evaluate_particular_solutions(self._model, stage, factor), _Sides(self._mesh)
+        swollen = self._sample_swelling(sides, [balanced for balanced, _ in particulars])
         strained = displacement - swollen  # by stress alone
-        point_forces, moved = self._move_points(traction, strained, stage, factor, particulars)
+        point_forces, moved = self._move_points(sides, traction, strained, stage, factor, particulars)
         works = [_Work(point_forces, moved, 0.5 * float(point_forces @ moved))]
         fields, whole = (traction - self._in_situ, strained, point_forces), traction + self._in_situ
-        works += [self._lift(reference, particulars, fields) for reference in self._forces]
-        works += [self._strain(reference, particulars, fields) for reference in self._stresses]
+        works += [self._lift(sides, reference, particulars, fields) for reference in self._forces]
+        works += [self._strain(sides, reference, particulars, fields) for reference in self._stresses]
         return EnergyState(
             traction, displacement, swollen,
             load=np.concatenate([each.load for each in works]),
@@ -189,35 +215,35 @@ class StoredEnergy:
         )  # fmt: skip
 
     def _move_points(
-        self, traction: Complex, displacement: Complex, stage: int, factor: float, particulars: _Particulars
+        self, sides: _Sides, traction: Complex, displacement: Complex, stage: int, factor: float,
+        particulars: _Particulars,
     ) -> tuple[Real, Real]:
         """Forces of the point loads (l,), 3 numbers each, and what they move by; 0 where their region is gone."""
         if not self._model.point_loads:
             return np.zeros(0), np.zeros(0)
         forces = measure_point_forces(self._model, stage, factor)
         moved = measure_point_motions(
-            self._model, self._mesh, self._faces, self.weight, (displacement, traction), particulars
+            self._model, self._mesh, sides.faces, self.weight, (displacement, traction), particulars
         )
         acting = np.repeat(self._find_acting_points(), 3)
         return np.where(acting, forces, 0.0), np.where(acting, moved, 0.0)
 
-    def _lift(self, reference: _Reference, particulars: _Particulars, fields: _Fields) -> _Work:
+    def _lift(self, sides: _Sides, reference: _Reference, particulars: _Particulars, fields: _Fields) -> _Work:
         """What the weight of a finite region works on, and stores; nothing where the region is gone."""
-        region = self._faces.region[reference.faces[0]]
-        if self.there is not None and self.there.regions[region]:
+        if self.there is not None and self.there.regions[reference.region]:
             return _Work(np.zeros(2), np.zeros(2), 0.0)
-        balanced, _ = particulars[region]
-        moved = reference.conjugate(self.weight, *fields) + (np.conj(balanced.force) * reference.integral).real
+        balanced, _ = particulars[reference.region]
+        moved = reference.conjugate(sides, self.weight, *fields) + (np.conj(balanced.force) * reference.integral).real
         weight = balanced.force + balanced.carried
         # In-situ stress that carries a weight does the work of both.
         both = weight + balanced.carried
         return _Work(_split(weight), moved, 0.5 * float(_split(both) @ moved))
 
-    def _strain(self, reference: _Reference, particulars: _Particulars, fields: _Fields) -> _Work:
+    def _strain(self, sides: _Sides, reference: _Reference, particulars: _Particulars, fields: _Fields) -> _Work:
         """What the stress far away in an infinite region works on, and stores."""
-        balanced, far = particulars[self._faces.region[reference.faces[0]]]
+        balanced, far = particulars[reference.region]
         initial, remote = np.array(balanced.initial.value), np.array(far.remote)
-        strained = reference.conjugate(self.weight, *fields)
+        strained = reference.conjugate(sides, self.weight, *fields)
         return _Work(initial + remote, strained, 0.5 * float((2 * initial + remote) @ strained))
 
     def _find_acting_points(self) -> Bool:
@@ -233,35 +259,34 @@ class StoredEnergy:
             along -= evaluate_ends(self._model, outer, stage, factor)
         return float(self.weight[outer.node] @ (outer.stiffness * along**2).sum(axis=1))
 
-    def _sample_in_situ(self) -> Complex:
+    def _sample_in_situ(self, sides: _Sides) -> Complex:
         """Traction of the in-situ stress on all faces (f,)."""
         traction = repeat_value(0.0, len(self.weight), complex)
         for number, (balanced, _) in enumerate(evaluate_particular_solutions(self._model, 0, 0.0)):
             at_rest = ParticularSolution(balanced.material, initial=balanced.initial)
             if at_rest.is_zero:
                 continue
-            own, traction = self._find_faces(number), np.require(traction, requirements="W")
-            traction[own] = at_rest.traction(self._faces.position[own], self._faces.normal[own])
+            own, traction = sides.find(number), np.require(traction, requirements="W")
+            traction[own] = at_rest.traction(sides.faces.position[own], sides.faces.normal[own])
         return traction
 
-    def _sample_swelling(self, particulars: Sequence[ParticularSolution]) -> Complex:
+    def _sample_swelling(self, sides: _Sides, particulars: Sequence[ParticularSolution]) -> Complex:
         """Displacement of the strain without stress on all faces (f,), each region turned and moved back to where it
         was in the mean: what forces are out of balance would work on the way to it from the corner of the model."""
         moved = repeat_value(0.0, len(self.weight), complex)
         for number, balanced in enumerate(particulars):
             if not balanced.swelling.is_zero:
-                own, moved = self._find_faces(number), np.require(moved, requirements="W")
-                place, weight = self._faces.position[own], self._all_weight[own]
+                own, moved = sides.find(number), np.require(moved, requirements="W")
+                place, weight = sides.faces.position[own], self._all_weight[own]
                 moved[own] = _take_back(place, balanced.swelling.displacement(place), weight)
         return moved
 
-    def _find_faces(self, region: int) -> Integer:
-        return self._by_region[self._bounds[region]:self._bounds[region + 1]]
-
-    def _refer(self, region: int, fields: Sequence[ParticularSolution], within: bool = False) -> _Reference:
+    def _refer(
+        self, sides: _Sides, region: int, fields: Sequence[ParticularSolution], within: bool = False
+    ) -> _Reference:
         """Fields about the origin, or about a point `within` a finite region, where rounding is smallest."""
-        faces = self._find_faces(region)
-        z, n = self._faces.position[faces], self._faces.normal[faces]
+        faces = sides.find(region)
+        z, n = sides.faces.position[faces], sides.faces.normal[faces]
         center = complex(z.mean()) if within else 0j
         z = z - center
         loads = list(self._model.point_loads.values())
@@ -270,7 +295,7 @@ class StoredEnergy:
         # The displacements of unit forces are multiples of z^2, whose integral is half that of n z^2 conj(z).
         second_moment = 0.5 * (self.weight[faces] * n * z**2 * np.conj(z)).sum()
         return _Reference(
-            faces, self._faces, tuple(fields), center,
+            region, tuple(fields), center,
             np.array([complex(field.displacement(np.array([1 + 0j]))[0]) * second_moment for field in fields]),
             motions,
         )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
@@ -47,8 +49,8 @@ class _Alike:
     place: Complex
     direction: Complex
     length: Real
-    pair: Integer
-    sense: Real
+    pair: NDArray[np.int32]
+    sense: NDArray[np.int8]
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ class TipRules:
             T[group.tip] = value + self._evaluate_initial(group, [balanced for balanced, _ in particulars])
         return T.reshape(-1, 2)
 
-    def _count_even(self, contact: ContactState, near: Integer) -> Integer:
+    def _count_even(self, contact: ContactState, near: NDArray[np.int32]) -> Integer:
         """On how many elements (k,) from tips on, with the pairs near (k, m (p + 1)), the pressure on open faces does
         not jump: the stress along the crack jumps with it. Of constant elements, which always jump, all."""
         per_element = self.mesh.order + 1
@@ -213,13 +215,14 @@ def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pa
     groups = []
     for (material, _), places in alike.items():
         at, first = np.array(places), places[0]
+        # Copies: views would keep the elements of all tips, and forms are kept through the run.
         shape = TipShape(
-            seen.select(first), tip[first],
+            deepcopy(seen.select(first)), tip[first].copy(),
             mesh.crack_local, material.kappa, bool(paths.whole[first]), int(paths.near[first]), int(paths.cut[first]),
             float(paths.cut_at[first]),
         )  # fmt: skip
-        pair = pair_of[_list_outward(mesh, paths.elements[at], paths.outward[at])]
-        sense = np.repeat(np.where(paths.outward[at], 1.0, -1.0), mesh.order + 1, axis=1)
+        pair = pair_of[_list_outward(mesh, paths.elements[at], paths.outward[at])].astype(np.int32)
+        sense = np.repeat(np.where(paths.outward[at], 1, -1).astype(np.int8), mesh.order + 1, axis=1)
         groups.append(_Alike(TipForms(shape), material, number[paths.tip[at]], region[at], place_of[at],
                              direction[at], length[at], pair, sense))
     return groups

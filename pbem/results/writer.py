@@ -149,15 +149,10 @@ class ResultWriter:
         self._latest = last_step
         self._storage = storage
         self._every = max(1, model.output_every)
-        faces = self._all_faces = list_faces(mesh)
-        self._weight = faces.weight
-        numbers = {name: number for number, name in enumerate(model.conditions)}
-        condition_of_curve = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)
-        self._condition = condition_of_curve[faces.curve]
         self._pairs = join_pairs(sort_pairs(mesh))
         self.tip_rules = collect_tip_rules(model, mesh)
         self.tip_rules.derive()
-        self._balance = EnergyBalance(model, mesh, last_step, reached, faces)
+        self._balance = EnergyBalance(model, mesh, last_step, reached)
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
         self._absence = Absence(model, mesh, points)
         self._pending: Step | None = None
@@ -254,7 +249,9 @@ class ResultWriter:
             append_row(energies, kind, getattr(self._energy, kind))
         append_balance(file, step)
         append_linearity(file, step)
-        append_rigid(file, self._model, self._mesh.curve_names, self._all_faces, step.displacement, step.traction)
+        if self._model.rigid:
+            faces = list_faces(self._mesh)
+            append_rigid(file, self._model, self._mesh.curve_names, faces, step.displacement, step.traction)
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         steps = file["steps"]
@@ -302,13 +299,17 @@ class ResultWriter:
             mesh = replace(mesh, region=np.array(kind_of)[mesh.region])
             initial = [initial[kind_of.index(number)] for number in range(len(kinds))]
         stress = evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
-        stress[np.array([region.rigid for region in self._model.regions])[self._all_faces.region]] = 0.0
+        rigid = np.array([region.rigid for region in self._model.regions])
+        if rigid.any():
+            stress[rigid[list_faces(self._mesh).region]] = 0.0
         return stress
 
     def _sum_reactions(self, traction: Complex) -> Complex:
         """Integral (c,) of the traction over every outer curve."""
-        outer = self._condition >= 0
-        force, of = (self._weight * traction)[outer], self._condition[outer]
+        mesh, numbers = self._mesh, {name: number for number, name in enumerate(self._model.conditions)}
+        condition = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)[mesh.node_curve]
+        outer = np.flatnonzero(condition >= 0)  # never on cracks, which have second faces
+        force, of = mesh.weight[outer] * traction[outer], condition[outer]
         count = len(self._model.conditions)
         return np.bincount(of, force.real, count) + 1j * np.bincount(of, force.imag, count)
 

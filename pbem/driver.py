@@ -170,15 +170,18 @@ def _refine_and_solve(
             watch.tell(line)
         for note in (*notes, *mesh.notes, *placement, *remarks) if anew else ():
             watch.note(note)
+        watch.notes = dict.fromkeys((*notes, *model.notes, *mesh.notes))  # of the file, not of the machine
         now = replace(one, first_unknowns=one.first_unknowns or 2 * mesh.nodes)
         try:
             with _keep_if_ended(former):
                 done = _solve(model, mesh, target, options, watch, signals, now, kept, former, graded)
         except ConvergenceError as error:
             if one.spare:
-                watch.note(f"The run on that mesh did not converge ({error.reason}): the results are those before.")
+                text = f"The run on that mesh did not converge ({error.reason}): the results are those before."
+                watch.note(text)
                 if former and former.store:
                     former.store(None)
+                do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path, (text,)))
                 return
             # What was gone on with, and what is kept for other runs, stays on its mesh.
             once = target.resume or kept
@@ -201,7 +204,7 @@ def _refine_and_solve(
             watch.note(planned.note)
         if planned is None or planned.model is model:
             if decision.ends:
-                do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path))
+                do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path, watch.notes))
             return
         model, made, graded, kept, watch.most = planned.model, planned.mesh, graded + 1, None, planned.most
 
@@ -255,12 +258,12 @@ def _solve(
             with waiting.rescue(model.output_every, interior, writer, watch.comm):
                 _store(writer, model, mesh, interior, waiting.replay(), watch, signals, one, None, None)
 
+        watch.notes = file.notes
         write_pass(replace(file, target=Target(target.path, False, True), beside=False), watch.comm, fill)
-        do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path))
 
     # What is not stored has no file to be kept.
     beside = one.number > 1 and not (former and former.store)
-    file = PassFile(model, mesh, target, options, region, one, beside)
+    file = PassFile(model, mesh, target, options, region, one, beside, watch.notes)
     modes = former.modes if former else None
     return write_pass(file, watch.comm, lambda writer: _fill(
         writer, model, mesh, interior, watch, signals, one, kept, modes, graded, store))

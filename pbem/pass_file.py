@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from pbem.arrays import Integer
@@ -25,7 +25,7 @@ Written = TypeVar("Written")
 @dataclass(frozen=True)
 class PassFile:
     """What the file of a pass begins with; region: of the interior points; beside: the former pass has a file, which is
-    kept until this one is finished."""
+    kept until this one is finished; notes: what is told of the pass, which grows as it goes on."""
 
     model: Model
     mesh: Mesh
@@ -34,6 +34,7 @@ class PassFile:
     region: Integer | None
     one: Pass
     beside: bool
+    notes: dict[str, None] = field(default_factory=dict)
 
 
 def write_pass(file: PassFile, comm: Comm, work: Callable[[ResultWriter | None], Written]) -> Written:
@@ -41,6 +42,8 @@ def write_pass(file: PassFile, comm: Comm, work: Callable[[ResultWriter | None],
     one = file.one
     with clock.piece("writing"):
         output = do_on_first(comm, PbemError, lambda: _open(file, comm.size), share=False) or PassOutput()
+    if output.writer:
+        output.writer.notes = file.notes
     try:  # from here on whatever happens has to leave a closed file
         found = work(output.writer)
     except BaseException as error:
@@ -109,6 +112,8 @@ def keep_waiting(
             return
         again = replace(file, target=target, beside=False)
         writer = (do_on_first(comm, PbemError, lambda: _open(again, ranks), share=False) or PassOutput()).writer
+        if writer:
+            writer.notes = file.notes
         try:
             store(writer, comm)
         finally:

@@ -27,6 +27,7 @@ from pbem.wording import write_percent
 
 MOST_TIPS = 10
 MOST_ERRORS = 10
+MOST_NOTES = 20
 # Works below this part of those of strains as large as the displacements are rounding.
 NO_WORK = 1e-13
 
@@ -65,6 +66,7 @@ def describe_results(results: Results, traces: int = 10) -> str:
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
         parts.append(_section("beyond linear theory at the last step", describe_linearity(results.linearity)))
         parts.append(_section("faces in each other at the last step", describe_pushed(find_pushed_faces(results))))
+        parts.append(_section("notes of the run", _shorten(results.notes, MOST_NOTES)))
         parts.append(_section("estimated discretisation errors", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],

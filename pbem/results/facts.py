@@ -74,7 +74,8 @@ def _collect_last(results: Results, traces: int | None) -> dict[str, Any]:
         "errors": {"missing": results.errors.missing,
                    "relative": {kind: np.max(values) for kind, values in results.errors.relative.items()}},
         "notes": [*compare_release(results), *explain_missing_factors(results),
-                  *(f"{text[0].upper()}{text[1:]}." for text in describe_pushed(find_pushed_faces(results)))],
+                  *(f"{text[0].upper()}{text[1:]}." for text in describe_pushed(find_pushed_faces(results))),
+                  *results.notes],
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ from pbem.model.refinement import Fractions
 from pbem.results.accuracy import Pass
 from pbem.results.journal import lock
 from pbem.results.layout import MAY_FOLLOW, count_steps, read_fractions
+from pbem.results.notes import write_notes
 from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.store import Store, name_part
 from pbem.results.trial import check_contents
@@ -84,11 +85,13 @@ def holds_steps(path: Path) -> bool:
         raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
 
 
-def expect_no_pass(path: Path) -> None:
-    """Say in the file of a finished pass that no other one follows. Raises ResultFileError."""
+def expect_no_pass(path: Path, notes: Iterable[str] = ()) -> None:
+    """Say in the file of a finished pass that no other one follows, with what was told of that. Raises ResultFileError.
+    """
     try:
         with change_attributes(path) as attributes:
             attributes.pop(MAY_FOLLOW, None)
+            write_notes(attributes, notes)
     except OSError as error:
         raise ResultFileError(str(path), f"cannot be written ({error.strerror or error})") from error
 

@@ -26,6 +26,7 @@ from pbem.results.journal import is_being_written
 from pbem.results.layout import ENERGIES, read_fractions
 from pbem.results.lazy import AllPairs, Contact, Interfaces, InteriorPoints
 from pbem.results.linearity import read_linearity
+from pbem.results.notes import read_notes
 from pbem.results.opening import freeze, open_quietly, read_names, refuse_damage
 from pbem.results.outline import find_tips
 from pbem.results.rigid import RigidMotion, read_rigid
@@ -56,9 +57,10 @@ class Results:
     stress-intensity factors; energy: the energies; balance: of the forces on every region, and linearity: size of
     strains and slips, both None in files of earlier versions; interior: interior points, None if the case has none;
     convergence: one row per Newton iteration with the fields step, iteration, residual, changed, stick, slip, open,
-    seconds; rigid: forces on rigid curves and tools, and their motions; overrides: values that were set in addition to
-    the case, one line KEY = VALUE each; failure: why the run ended early (status "failed" or "stopped"), empty if it
-    did not, or if it was killed.
+    seconds; rigid: forces on rigid curves and tools, and their motions; notes: what the run told of the model and
+    its steps, in order, none in files of earlier versions; overrides: values that were set in addition to the case, one
+    line KEY = VALUE each; failure: why the run ended early (status "failed" or "stopped"), empty if it did not, or if
+    it was killed.
     """
 
     path: Path
@@ -86,6 +88,7 @@ class Results:
     interior: InteriorPoints | None
     convergence: NDArray[Any] = field(repr=False)
     rigid: Mapping[str, RigidMotion] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def displacement(self) -> Real:
@@ -325,6 +328,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         interior=read_interior(path, file, k),
         convergence=freeze(file["convergence"][...]),
         rigid=read_rigid(file, k),
+        notes=read_notes(attributes),
     )
 
 

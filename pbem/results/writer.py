@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -40,6 +40,7 @@ from pbem.results.layout import (
     write_header,
 )
 from pbem.results.linearity import append_linearity
+from pbem.results.notes import write_notes
 from pbem.results.opening import refuse_damage
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
@@ -72,7 +73,7 @@ class ResultWriter:
 
     last_step: the last stored step of a resumed file (its `iterations` are empty), None of a new one. unfinished: the
     step after it in which the run was stopped, or None. former: the step before it, if it was of the same stage.
-    tip_rules: how the values at the tips follow from a step.
+    tip_rules: how the values at the tips follow from a step. notes: what the file tells of the run.
     """
 
     def __init__(
@@ -157,6 +158,7 @@ class ResultWriter:
         self._absence = Absence(model, mesh, points)
         self._pending: Step | None = None
         self.appended = 0  # steps that are in the file for good
+        self.notes: Iterable[str] = ()  # read whenever something is brought to the disk
 
     @property
     def _file(self) -> h5py.File:
@@ -198,6 +200,7 @@ class ResultWriter:
         return tuple(notes)
 
     def _commit(self, what: str) -> None:
+        write_notes(self._file.attrs, self.notes)
         try:
             self._storage.commit()
         except OSError as error:
@@ -339,6 +342,7 @@ class ResultWriter:
             if status == "finished":
                 self.fail("StorageError", str(error), "stopped")
                 raise StorageError(str(self.path), f"no room for the last step ({error.strerror or error})") from error
+        write_notes(self._file.attrs, self.notes)
         for name, value in {**reasons, "status": status}.items():
             self._file.attrs[name] = value
         self._storage.close()

@@ -25,7 +25,7 @@ class Watch:
 
     Calls raise StopError or LawError, on all ranks alike. iterations: since the pass began, those of tries that failed
     as well. most: a pass that comes to halve a step after more of them ends with ConvergenceError ("iteration limit"),
-    as it is not worth more; None for as many as it takes.
+    as it is not worth more; None for as many as it takes. notes: what was told, in order, since they were begun anew.
     """
 
     def __init__(self, comm: MPI.Intracomm, listener: Reporter, signals: StopSignals) -> None:
@@ -35,6 +35,7 @@ class Watch:
         self._laws: tuple[CustomLaw, ...] = ()
         self.iterations = 0
         self.most: int | None = None
+        self.notes: dict[str, None] = {}
 
     def look_after(self, laws: PairLaws) -> None:
         """From now on, see whether these laws fail or answer differently on different ranks."""
@@ -46,7 +47,8 @@ class Watch:
         self._tell("begin", model)
 
     def note(self, text: str) -> None:
-        """Hand on."""
+        """Keep, and hand on."""
+        self.notes[text] = None
         self._tell("note", text)
 
     def tell(self, text: str) -> None:

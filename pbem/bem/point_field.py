@@ -62,6 +62,14 @@ class PointField:
         field = np.where(away == 0, complex(np.nan, np.nan), field)
         return np.asarray(field / (2 * material.shear_modulus))
 
+    def measure_shift(self, length: float, material: Material) -> complex:
+        """The displacement (complex), the same everywhere, by which the field is larger than with this length as the
+        unit of the logarithm."""
+        shift = find_shift(self.net_force, length, self.length, material)
+        if self.load.on_boundary and self.load.beyond is None:  # of a wedge with its cut outside of the body
+            shift *= (material.kappa + 1) ** 2 / (4 * material.kappa)
+        return shift
+
     def stress(self, point: Complex, material: Material) -> Real:
         """sxx, syy, sxy (n, 3) at points; not numbers at its own (theory, 3, 98, 99, 100)."""
         load, kappa = self.load, material.kappa
@@ -92,3 +100,10 @@ class PointField:
         along, across = (np.conj(inward) * self.force).real, (np.conj(inward) * self.force).imag
         sine = 0.5 * math.sin(2 * angle)
         return complex(-0.25 * inward * (along / (angle + sine) + 1j * across / (angle - sine)))
+
+
+def find_shift(force: complex, length: float, unit: float, material: Material) -> complex:
+    """The displacement (complex), the same everywhere, by which that of a net force (complex, per thickness) in a plane
+    is larger with one unit of the logarithm (theory, 98) than with another length in its place."""
+    gamma = -force / (2 * math.pi * (1 + material.kappa))
+    return complex(material.kappa * gamma * math.log(length / unit) / material.shear_modulus)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import pi
 from typing import Literal
 
 from pbem.description.generation import GeneratedGroup
@@ -323,13 +324,24 @@ class Model:
 
     @cached_property
     def logarithm_lengths(self) -> dict[str, float]:
-        """The unit of the logarithm in the equations of every region with point loads: `bem.operator.collect_sources`.
-        """
+        """The unit of the logarithm in the equations of every region with point loads, and of infinite ones:
+        `bem.operator.collect_sources`."""
         return {
             region.name: 8 * measure_spread(self.curves, (
                 *(side.curve for loop in region.loops for side in loop.sides), *region.cracks))
-            for region in self.regions if region.name in self.point_loads_by_region
+            for region in self.regions if region.infinite or region.name in self.point_loads_by_region
         }  # fmt: skip
+
+    @cached_property
+    def self_energy_lengths(self) -> dict[str, float]:
+        """The same lengths as energies count, whatever the mesh is: of a region's loops, without its cracks if it has
+        loops, over pi. At this distance displacements of point loads, or of a net force on a plane, are zero."""
+        lengths = {}
+        for region in self.regions:
+            if region.name in self.logarithm_lengths:
+                around = tuple(side.curve for loop in region.loops for side in loop.sides) or region.cracks
+                lengths[region.name] = sum(self.curves[name].length for name in around) / pi
+        return lengths
 
     @property
     def finite_regions(self) -> list[int]:

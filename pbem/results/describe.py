@@ -184,7 +184,13 @@ def _describe_energy(results: Results) -> list[str]:
     known = scale > NO_WORK * _measure_stiffness(results)
     exact = f"to {abs(lacks):.1e} of the largest" if known else "all of them rounding"
     return [f"external work {_number(external)} = elastic {_number(elastic)} + dissipated {_number(dissipated)}{free}, "
-            f"{exact}", *_shorten(_describe_runaways(results), 6)]
+            f"{exact}", *_name_left_out(results), *_shorten(_describe_runaways(results), 6)]
+
+
+def _name_left_out(results: Results) -> list[str]:
+    """That works of point loads are without the infinite one of each alone."""
+    has_any = bool(json.loads(results.configuration or "{}").get("point_loads"))
+    return ["without the infinite energy of each point load alone (pbem help results)"] * has_any
 
 
 def _measure_stiffness(results: Results) -> float:

@@ -1,7 +1,8 @@
 """What point loads work on: the displacement and the rotation at their points, but for what each of them makes itself.
 
 The displacement at a point force grows like the logarithm of the distance, so that its own part is without bound, and
-without bound the energy stored around it. Both are left out: the same on both sides of the energy balance.
+without bound the energy stored around it. Both are left out: the same on both sides of the energy balance. What remains
+depends on where the logarithm is zero, for which the mesh must not count (`Model.self_energy_lengths`).
 """
 
 from __future__ import annotations
@@ -46,9 +47,13 @@ def measure_point_motions(
         z, n = faces.position[own], faces.normal[own]
         u, t = fields[0][own] - unswollen.displacement(z), fields[1][own] - unswollen.traction(z, n)
         others = replace(unswollen, points=tuple(each for each in balanced.points if each.load.name != load.name))
+        # What a load makes itself is without bound, and left out up to one distance for all meshes and cracks.
+        alone = sum(each.measure_shift(model.self_energy_lengths[load.region], balanced.material)
+                    for each in balanced.points if each.load.name == load.name)
+        shift = np.array([alone.real, alone.imag, 0.0])
         if load.on_boundary:
             at = _find_at_end(mesh, own, u, load.place)
-            moved.append(np.append(at + _evaluate_motion(others, load.place, model.size)[:2], 0.0))
+            moved.append(shift + np.append(at + _evaluate_motion(others, load.place, model.size)[:2], 0.0))
             continue
         length = model.logarithm_lengths[load.region]
         units = [PointField(load, force, moment, length) for force, moment in ((1, 0.0), (1j, 0.0), (0j, 1.0))]
@@ -58,7 +63,7 @@ def measure_point_motions(
             for unit in unit_fields
         ])
         known = sum(_evaluate_motion(each, load.place, model.size) for each in (others, far))
-        moved.append(elastic + known)
+        moved.append(shift + elastic + known)
     return np.concatenate(moved)
 
 

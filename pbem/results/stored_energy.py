@@ -13,6 +13,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
+from pbem.bem.point_field import find_shift
 from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.at_rest import bear_in_situ
 from pbem.contact.laws import collect_laws
@@ -205,6 +206,8 @@ class StoredEnergy:
         fields, whole = (traction - self._in_situ, strained, point_forces), traction + self._in_situ
         works += [self._lift(sides, reference, particulars, fields) for reference in self._forces]
         works += [self._strain(sides, reference, particulars, fields) for reference in self._stresses]
+        planes = [number for number, each in enumerate(self._model.regions) if each.infinite]
+        works += [self._move_plane(sides, number, fields) for number in planes]
         return EnergyState(
             traction, displacement, swollen,
             load=np.concatenate([each.load for each in works]),
@@ -245,6 +248,17 @@ class StoredEnergy:
         initial, remote = np.array(balanced.initial.value), np.array(far.remote)
         strained = reference.conjugate(sides, self.weight, *fields)
         return _Work(initial + remote, strained, 0.5 * float((2 * initial + remote) @ strained))
+
+    def _move_plane(self, sides: _Sides, number: int, fields: _Fields) -> _Work:
+        """What a net force on an infinite region works on, as its displacement is counted from a distance that does not
+        depend on the mesh (theory, 101)."""
+        model, region = self._model, self._model.regions[number]
+        own, numbered = sides.find(number), enumerate(model.point_loads.values())
+        force = complex(self.weight[own] @ fields[0][own])
+        force += sum(complex(*fields[2][3 * k : 3 * k + 2]) for k, load in numbered if load.region == region.name)
+        lengths = model.self_energy_lengths[region.name], model.logarithm_lengths[region.name]
+        moved = -find_shift(force, *lengths, region.material)
+        return _Work(_split(force), _split(moved), 0.5 * (np.conj(force) * moved).real)
 
     def _find_acting_points(self) -> Bool:
         """Which point loads (c,) act on regions that are there."""

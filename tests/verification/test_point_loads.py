@@ -11,6 +11,7 @@ import pytest
 
 import pbem
 from pbem.arrays import Complex, Real
+from pbem.results.reader import Results
 
 MATERIAL = {"young": 3e3, "poisson": 0.2}
 # Shifted, turned, and in other units of length.
@@ -250,8 +251,7 @@ def test_energy_is_the_work_on_what_the_other_loads_do(tmp_path: Path) -> None:
                         for name, (place, force) in loads.items()},
     }, tmp_path / "two.h5")  # fmt: skip
     shear, kappa, radius = 3e3 / 2.4, 2.2, 1e-3
-    ends = results.elements.vertices.reshape(-1, 2) @ [1, 1j]
-    unit = 8 * 2 * np.abs(ends - ends.mean()).max()
+    unit = 10 / np.pi  # what is around the block, over pi
     work = 0.0
     for place, force in loads.values():
         around = place + radius * np.exp(2j * np.pi * np.arange(8) / 8)
@@ -260,6 +260,70 @@ def test_energy_is_the_work_on_what_the_other_loads_do(tmp_path: Path) -> None:
         work += 0.5 * (np.conj(force) * (mean - alone)).real
     assert results.energy.external[-1] == pytest.approx(work, rel=5e-4)
     assert results.energy.elastic[-1] == pytest.approx(work, rel=5e-4)
+
+
+def solve_sheet(
+    folder: Path, place: tuple[float, float], elements: tuple[int, int, int] = (12, 8, 12), depth: float = 0.0
+) -> Results:
+    """A block that stands on its bottom under one force, with so many elements and a crack in its side so deep."""
+    bottom, right, top = elements
+    crack = {"crack": {"points": [[3, 1.1], [3 - depth, 1.1]], "elements": 8}} if depth else {}
+    return pbem.run({
+        "materials": {"m": MATERIAL},
+        "curves": {"bottom": {"points": [[0, 0], [3, 0]], "elements": bottom, "grading": "none"},
+                   "right": {"points": [[3, 0], [3, 2]], "elements": right, "grading": "none"},
+                   "top": {"points": [[3, 2], [0, 2]], "elements": top, "grading": "none"},
+                   "left": {"points": [[0, 2], [0, 0]], "elements": 8, "grading": "none"}, **crack},
+        "regions": {"block": {"material": "m", "boundary": ["bottom", "right", "top", "left"], "cracks": [*crack]}},
+        "interfaces": {name: {"law": "open"} for name in crack},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}}, "analysis": {"steps": 1},
+        "point_loads": {"a": {"at": list(place), "fx": 1.0, "fy": 3.0}},
+    }, folder / "sheet.h5", force=True)  # fmt: skip
+
+
+@pytest.mark.parametrize("place", [(1.2, 0.7), (1.2, 2.0)])
+def test_energies_of_a_load_do_not_depend_on_the_mesh_and_grow_by_j(
+    place: tuple[float, float], tmp_path: Path
+) -> None:
+    """Elements of other lengths change nothing. A crack that grows under a dead load stores J per length: dU/da = J."""
+    reached = [solve_sheet(tmp_path, place, elements).energy for elements in ((12, 8, 12), (12, 8, 40), (60, 8, 12))]
+    scale = 10 / (3e3 / 2.4)  # force squared over the shear modulus
+    for energy in reached[1:]:
+        assert abs(energy.elastic[-1] - reached[0].elastic[-1]) < 3e-4 * scale
+    short, middle, long = (solve_sheet(tmp_path, place, depth=depth) for depth in (0.98, 1.0, 1.02))
+    grown = (long.energy.elastic[-1] - short.energy.elastic[-1]) / 0.04
+    assert grown == pytest.approx(np.nanmax(middle.tips["crack"].J[-1]), rel=1e-2)
+
+
+@pytest.mark.parametrize("kind", ["loads", "weight"])
+def test_energies_of_a_plane_with_a_net_force_do_not_depend_on_the_mesh(kind: str, tmp_path: Path) -> None:
+    """Displacements grow with the logarithm of the distance: the energies are those counted from one length, over
+    whose multiple by e they change by what a net force P does on Kelvin's displacement, kappa P^2/(4 pi G (1 + kappa)).
+    """
+    def solve(hole: int, crack: int, wide: float = 1.0) -> float:
+        body = {"body": {"material": "heavy", "boundary": ["hole"]}} if kind == "weight" else {}
+        loads = {"a": {"at": [1.5, 0.5], "fx": 1.0, "fy": 2.0}, "b": {"at": [-2, 0], "fx": 1.0, "fy": 1.0}}
+        results = pbem.run({
+            "materials": {"m": MATERIAL, "heavy": {**MATERIAL, "density": 1.0}},
+            "curves": {"hole": {"center": [0, 0], "radius": 1.0, "elements": hole, "grading": "none"},
+                       "far": {"center": [1e5, 0], "radius": wide, "elements": 8, "grading": "none"},
+                       "crack": {"points": [[2, -1], [2, 1]], "elements": crack, "grading": "none"}},
+            "regions": {"plane": {"material": "m", "infinite": True, "boundary": ["hole", "far"], "cracks": ["crack"]},
+                        **body},
+            "interfaces": {"crack": {"law": "open"}}, "analysis": {"steps": 1},
+            **({"point_loads": loads} if kind == "loads" else {"gravity": {"gy": -1.0}}),
+        }, tmp_path / "plane.h5", force=True)  # fmt: skip
+        assert results.energy.external[-1] == pytest.approx(results.energy.elastic[-1], rel=1e-3, abs=1e-6)
+        return float(results.energy.elastic[-1])
+
+    one, other = solve(16, 8), solve(16, 40)
+    force, shear, kappa = (13.0 if kind == "loads" else np.pi**2), 3e3 / 2.4, 2.2
+    scale = kappa * force / (4 * np.pi * shear * (1 + kappa))
+    assert abs(one - other) < 1e-3 * scale
+    # A far hole only changes the length: 2 pi (1 + 1) becomes 2 pi (1 + 9). What two loads apart do is as it was, and
+    # each load alone is left out up to the same length.
+    alone = (5.0 + 2.0) if kind == "loads" else 0.0
+    assert solve(16, 8, 9.0) - one == pytest.approx(scale * np.log(5.0) * (force - alone) / force, rel=1e-2)
 
 
 @pytest.mark.parametrize(("load", "words"), [

@@ -143,7 +143,7 @@ class LengthField:
                 self._ends[number] = leg.divide(leg.elements, *self.refined[number])
         self._component = _connect(surroundings, tips)
         longest = np.array([np.diff(ends).max() for ends in self._ends]) * self.length
-        self._roundings = find_roundings(legs, longest, order)
+        self._roundings = find_roundings(legs, surroundings.curve, longest, order)
         self._tips, self._at_tip = self._collect_tips(tips)
         self._loads = [(np.array([name in around for name in surroundings.curve], dtype=bool) & ~self.kept,
                         cKDTree(np.column_stack([at.real, at.imag]))) for around, at in loads]

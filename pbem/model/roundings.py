@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -19,7 +20,8 @@ from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Leg
 from pbem.geometry.tolerance import TIE
 
-# An arc that turns by so much (radians) is a rounded corner to elements longer than its radius.
+# Arcs of a curve, one after another, that turn by so much (radians) together are a rounded corner to elements longer
+# than their radii. A curve by expressions has an arc for each element.
 TURNS = math.radians(10.0) * (1 - TIE)
 # Growth of lengths per distance from the ends of the arc, by the order of the polynomials. The displacement beside a
 # slot with a round end of 5e-4 of its length was 1.5 % off at order 2, 1.8 % at order 3 and 6.6 % at order 1 without;
@@ -57,22 +59,32 @@ class Roundings:
         return allowed
 
 
-def find_roundings(legs: Sequence[Leg], longest: Real, order: int) -> Roundings:
+def find_roundings(legs: Sequence[Leg], names: Sequence[str], longest: Real, order: int) -> Roundings:
     """Arcs that are short beside elements of the legs that they hang together with.
 
-    longest: the longest element (legs,) of each leg; order: of the polynomials."""
-    joined = join_legs(legs)
+    names: of the curves of the legs; longest: the longest element (legs,) of each leg; order: of the polynomials."""
+    joined, turns = join_legs(legs), _sum_turns(legs, names)
     most = np.zeros(len(legs))
     np.maximum.at(most, joined, longest)
     point, radius, set_of = [], [], []
     for number, leg in enumerate(legs):
-        if abs(leg.turn) >= TURNS and leg.length / abs(leg.turn) < most[joined[number]]:
+        if turns[number] >= TURNS and leg.length < abs(leg.turn) * most[joined[number]]:
             point += [leg.start, leg.end]
             radius += 2 * [leg.length / abs(leg.turn)]
             set_of += 2 * [joined[number]]
     return Roundings(
         np.array(point, dtype=complex), np.array(radius), np.array(set_of, dtype=np.int64), joined, STEEPEST[order]
     )
+
+
+def _sum_turns(legs: Sequence[Leg], names: Sequence[str]) -> list[float]:
+    """Of each leg the angle (radians) by which the arcs of its curve around it turn one after another to its side."""
+    turns: list[float] = []
+    sides = zip(names, (math.copysign(1.0, leg.turn) if leg.turn else 0.0 for leg in legs), strict=True)
+    for _, group in groupby(sides):
+        count = len(list(group))
+        turns += count * [sum(abs(leg.turn) for leg in legs[len(turns):len(turns) + count])]
+    return turns
 
 
 def join_legs(legs: Sequence[Leg]) -> Integer:

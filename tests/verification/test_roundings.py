@@ -76,7 +76,7 @@ def solve_kink(radius: float, turn: float, order: int) -> Solved:
 
 def read_tips(solved: Solved) -> np.ndarray:
     """KI and KII at the start of the crack and at its end."""
-    (start, end) = (np.array(solved.factors(name)) for name in ("before", "behind"))
+    start, end = (np.array(solved.factors(name)) for name in ("before", "behind"))
     return np.array([start[:, 0], end[:, 1]])
 
 
@@ -88,6 +88,18 @@ def test_a_crack_that_turns_within_a_small_radius_has_the_factors_of_one_that_tu
     sharp = read_tips(solve_kink(0.0, turn, 3))
     rounded = read_tips(solve_kink(1e-4, turn, order))
     assert np.abs(rounded - sharp).max() <= 1.2e-3 * np.abs(sharp).max()
+
+
+@pytest.mark.parametrize("elements", [6, 40])
+def test_a_round_end_by_expressions_is_one_however_many_elements_it_has(elements: int) -> None:
+    tables = write_slot(1e-3, HERE, 2)
+    arc = read_lengths(parse_model(write_case(tables))[1], "low")
+    angle = "(1.5 - t) * pi"
+    tables["curves"]["round"] = {"expression": [f"1.0005 + 0.0005*cos({angle})", f"0.0005*sin({angle})"],
+                                 "elements": elements}  # fmt: skip
+    found = read_lengths(parse_model(write_case(tables))[1], "low")
+    assert len(found) <= len(arc) + 2
+    assert found[-1] <= 1.1 * arc[-1]
 
 
 def read_lengths(model: Model, name: str) -> np.ndarray:

@@ -57,8 +57,7 @@ class Arrangement:
         components = np.tile(np.repeat(gone, 2), 2)
         return replace(
             load, values=np.where(self.outer[:, None], 0.0, load.values), known=np.where(components, 0.0, load.known),
-            far=np.where(gone, 0.0, load.far), particular=np.where(gone, 0.0, load.particular),
-            carried=load.carried + carried,
+            fields=load.fields.without(self.regions), carried=load.carried + carried,
             rigid=_free_what_is_gone(load.rigid, outer, gone),
         )
 

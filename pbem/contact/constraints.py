@@ -90,7 +90,8 @@ class ConstraintMap:
         load = self.load
         own = np.arange(self.mesh.nodes) if nodes is None else nodes
         fields: tuple[NDArray[Any], ...] = (
-            self.take_offset(own).reshape(2, -1), take_elements(load.known, own, 2).reshape(2, -1), load.far[:, own])
+            self.take_offset(own).reshape(2, -1), take_elements(load.known, own, 2).reshape(2, -1),
+            load.fields.take_far(own))
         sizes = [np.linalg.norm(part) for moved, borne in fields for part in (moved, borne / self.traction_scale)]
         return float(np.sum(np.square(sizes)))
 

@@ -10,7 +10,8 @@ import numpy as np
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.bem.point_field import PointField
-from pbem.bem.rigid_region import list_region_nodes, load_rigid_rows
+from pbem.bem.rigid_region import load_rigid_rows
+from pbem.contact.load_fields import NodeFields, sample_solutions
 from pbem.contact.rigid_nodes import RigidNodes, collect_rigid_nodes, evaluate_rigid, list_nodes_of
 from pbem.geometry.curve import find_middle_of_legs
 from pbem.geometry.loop import loop_legs
@@ -21,9 +22,6 @@ from pbem.model.swelling import NO_SWELLING
 from pbem.model.varying import Moment, Places, Value, Varying, blend
 from pbem.model.walls import Wall
 from pbem.uniform import fold_uniform, repeat_value
-
-# Nodes at which fields are evaluated at a time.
-SAMPLED = 4096
 
 
 @dataclass(frozen=True)
@@ -51,8 +49,8 @@ class Load:
     """values (k, 2): known displacement or traction of the outer nodes; pressure (m,): fluid pressure of the pairs.
 
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
-    integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
-    particular (nodes,): displacement of both particular solutions at every node (at a crack's, of both its faces).
+    integral equations do not see. fields: displacement and traction of the remote field, and the displacement of both
+    particular solutions, at any nodes.
     of_points (nodes,): the displacement of point loads' fields, a part of these. net_force: of those on an
     infinite region, that of their fields far away (complex).
     rigid (b, 3): of all rigid bodies the forces or motions.
@@ -63,8 +61,7 @@ class Load:
     values: Real
     pressure: Real
     known: Real
-    far: Complex
-    particular: Complex
+    fields: NodeFields
     of_points: Complex
     rigid: Real
     carried: Real
@@ -125,23 +122,17 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         values += outer.stiffness * evaluate_ends(model, outer, stage, factor)
     remote = interpolate(before.remote, after.remote)
     particulars = [balanced_solution(model, region, stage, factor) for region in model.regions]
-    balanced = _sample(mesh, particulars)
+    balanced = sample_solutions(mesh, particulars)
     points = [each for region, particular in zip(model.regions, particulars, strict=True) if region.infinite
               for each in particular.points]
-    far = _sample(mesh, [far_solution(model, region, remote) for region in model.regions])
-    particular = balanced[0] + far[0] if not _is_nothing(balanced) else far[0]
+    far = [far_solution(model, region, remote) for region in model.regions]
     rigid = evaluate_rigid(model, stage, factor)
-    if any(body.tool for body in model.rigid.values()):
-        far = far.copy()
-    for number, given in enumerate(rigid):
-        _load_tool(model, mesh, number, given, far[0])
     return Load(
         values=values,
         pressure=fold_uniform(evaluate_pressure(model, mesh, stage, factor)),
         known=_spread_known(mesh, balanced),
-        far=far,
-        particular=particular,
-        of_points=_sample(mesh, [each.of_points for each in particulars])[0],
+        fields=NodeFields(mesh, particulars, far, _load_tools(model, mesh, rigid)),
+        of_points=sample_solutions(mesh, [each.of_points for each in particulars])[0],
         net_force=sum((each.net_force for each in points), 0j),
         rigid=rigid,
         carried=evaluate_walls(model, mesh, stage, factor),
@@ -169,12 +160,12 @@ def evaluate_ends(model: Model, outer: OuterNodes, stage: int, factor: float) ->
     return _evaluate_pairs(model, outer, (before, model.stages[stage].ends), stage, factor)
 
 
-def _load_tool(model: Model, mesh: Mesh, number: int, given: Real, far: Complex) -> None:
-    """Put the right-hand sides of a rigid body that is a tool among the displacements (nodes,) far away."""
-    name, body = list(model.rigid.items())[number]
-    if body.tool:
-        region = mesh.region_names.index(name)
-        far[list_region_nodes(mesh, region)] = load_rigid_rows(mesh, region, model.regions[region].material, given)
+def _load_tools(model: Model, mesh: Mesh, rigid: Real) -> dict[int, Complex]:
+    """The right-hand sides of rigid bodies (b, 3) that are tools, by the numbers of their regions."""
+    regions = {mesh.region_names.index(name): given
+               for (name, body), given in zip(model.rigid.items(), rigid, strict=True) if body.tool}
+    return {region: load_rigid_rows(mesh, region, model.regions[region].material, given)
+            for region, given in regions.items()}
 
 
 def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
@@ -237,24 +228,6 @@ def _spread_known(mesh: Mesh, balanced: Complex) -> Real:
     known[..., 0], known[..., 1] = balanced.real, balanced.imag
     known[0, mesh.node_crack] = 0.0
     return known.ravel()
-
-
-def _sample(mesh: Mesh, particulars: Sequence[ParticularSolution]) -> Complex:
-    """Displacement and traction (2, nodes) of the regions' particular solutions at all nodes.
-
-    Some nodes at a time, as what they are computed by takes several times the room of the fields; see `repeat_value`
-    where there is none.
-    """
-    if all(particular.is_zero for particular in particulars):
-        return repeat_value(0.0, (2, mesh.nodes), complex)
-    fields = np.zeros((2, mesh.nodes), dtype=complex)
-    ends = np.searchsorted(mesh.node_region, np.arange(len(particulars) + 1))
-    for region, particular in enumerate(particulars):
-        for begin in range(ends[region], ends[region + 1], SAMPLED) if not particular.is_zero else ():
-            own = slice(begin, min(begin + SAMPLED, ends[region + 1]))
-            fields[0, own] = particular.displacement(mesh.position[own])
-            fields[1, own] = particular.traction(mesh.position[own], mesh.normal[own])
-    return fields
 
 
 def balanced_solution(model: Model, region: Region, stage: int, factor: float) -> ParticularSolution:

@@ -1,4 +1,4 @@
-"""Solutions on several ranks, of which each forms the laws and the part of the constraint map that it needs."""
+"""Solutions on several ranks, of which each forms the laws, the fields and the part of the map that it needs."""
 
 from __future__ import annotations
 
@@ -42,13 +42,15 @@ solved = tangent.check(tangent.solve(constraints, load, law, 0.1), constraints, 
 v = tangent.evaluate(solved, constraints)
 # Beside what is whole on every rank, and matrices of the preconditioner.
 seen = set()
-for apart in (problem, modes, memory, load, solved, tangent.solution, tangent.preconditioner.inverses):
+for apart in (problem, modes, memory, solved, tangent.solution, tangent.preconditioner.inverses):
     list_arrays(apart, seen)
 pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+far = [array.size for array in list_arrays(load, set(seen))]
 held = [array.size for array in list_arrays([law, constraints, tangent.product, tangent.preconditioner], seen)]
 whole = problem.constrain(law, load)
 found = world.gather({
-    "held": max(held), "off": float(np.abs(v - whole.evaluate(solved.unknowns)).max() / np.abs(v).max()),
+    "held": max(held), "far": max(far),
+    "off": float(np.abs(v - whole.evaluate(solved.unknowns)).max() / np.abs(v).max()),
     "residual": problem.measure(problem.apply(v, load)) / problem.measure(problem.apply(whole.offset, load)),
     "law": float(np.abs(pairs.p_n - law.store().evaluate(read_pair_unknowns(problem.mesh, solved.unknowns)).p_n).max()),
     "scales": len(problem.equation_scale) / len(problem.system.nodes),
@@ -59,7 +61,7 @@ if world.rank == 0:
 """
 
 
-def test_no_rank_forms_all_laws_or_the_whole_map(tmp_path: Path) -> None:
+def test_no_rank_forms_all_laws_fields_or_the_whole_map(tmp_path: Path) -> None:
     ranks, case = 3, tmp_path / "field.toml"
     text = FIELD.replace("count = 12", "count = 90").replace("12, 12", "40, 40").replace("elements = 6", "elements = 4")
     case.write_text(f'{text}[solver]\noperator = "hierarchical"\n', encoding="utf-8")
@@ -67,6 +69,7 @@ def test_no_rank_forms_all_laws_or_the_whole_map(tmp_path: Path) -> None:
     assert run.returncode == 0, run.stderr
     for share in json.loads(run.stdout):
         assert share["held"] < 4 * share["unknowns"] / ranks
+        assert share["far"] < 1.5 * share["unknowns"] / ranks  # displacement and traction, complex
         assert share["law"] < 1e-12 and share["scales"] == 1
         assert share["off"] < 1e-15 and abs(share["given"] - 1) < 1e-14
         assert share["residual"] < 1e-9

@@ -222,8 +222,8 @@ class Problem:
         """This rank's part of the equations that comes from far away; lengths (theory, 15)."""
         own = self.system.nodes
         of_tractions = self.mesh.traction_equation[own]
-        far: Complex = np.where(of_tractions, load.far[1, own], load.far[0, own])
-        return split_components(self.equation_scale * far)
+        far = load.fields.take_far(own)
+        return split_components(self.equation_scale * np.where(of_tractions, far[1], far[0]))
 
     def find_released(self, v: Real, released: Real | None) -> Real | float:
         """This rank's rows of what released combinations (a, r) of the anchors add to B v."""
@@ -269,7 +269,7 @@ class Problem:
         (theory, 13)
         """
         whole = gather_parts(self.comm, self.system.recover(v - load.known))
-        return whole[0::2] + 1j * whole[1::2] + load.particular[self.all_crack_nodes]
+        return whole[0::2] + 1j * whole[1::2] + load.fields.take_particular(self.all_crack_nodes)
 
     def make_tangent(self) -> TangentOperator:
         """The tangent operator that belongs to the system."""

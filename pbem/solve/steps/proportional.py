@@ -42,7 +42,7 @@ def _grows_from_rest(problem: Problem, memory: Memory, stage: int, reached: floa
     )
     first = problem.evaluate_load(0, 0.0)
     whole = problem.evaluate_load(0, 1.0)
-    starts = (first.values, first.known, first.far, first.particular, first.carried)
+    starts = (first.values, first.known, *first.fields.list_all(), first.carried)
     return untouched and same and not any(part.any() for part in starts) and not whole.pressure.any()
 
 

@@ -301,5 +301,5 @@ class CondensedTangent(TangentOperator):
 def join_load(constant: Real, load: Load, traction_scale: float) -> Real:
     """All that forces depend on, in one vector of numbers of one size: the map's offset, and the known fields."""
     scale = np.repeat([1.0, 1.0 / traction_scale], len(constant) // 2)
-    far = load.far * np.array([[1.0], [1.0 / traction_scale]])
+    far = load.fields.take_far(np.arange(len(constant) // 4)) * np.array([[1.0], [1.0 / traction_scale]])
     return np.concatenate([constant * scale, load.known * scale, far.real.ravel(), far.imag.ravel()])

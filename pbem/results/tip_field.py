@@ -16,7 +16,8 @@ from pbem.geometry.elements import Elements
 @dataclass(frozen=True)
 class TipShape:
     """Elements (m,) seen from the tip. tip (m,): as Mesh.tip, when travelled away from the tip. local (p + 1,): their
-    nodes. whole, near, cut, cut_at: see TipPath."""
+    nodes. whole, near, cut, cut_at: see TipPath. soft: what the faces carry depends on the jump, as in an
+    elastic joint, so that it grows from the tip on like the root of the distance."""
 
     elements: Elements
     tip: NDArray[np.int8]
@@ -26,6 +27,7 @@ class TipShape:
     near: int
     cut: int
     cut_at: float
+    soft: bool = False
 
 
 @cache

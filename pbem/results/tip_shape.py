@@ -4,7 +4,8 @@ Read from the last element alone, K is as wrong as the jump there: by a tenth wh
 elements near the tip are right in the mean: their tractions fulfil the equations at the collocation points. So three
 identities are taken over the part of the crack near the tip, with the tractions on its faces not from the jumps, but
 interpolated between the collocation points. They hold whatever the faces carry and whatever else acts, as the rest of
-the field (other cracks, boundaries, loads) is regular at the tip and has part in them only by these tractions.
+the field (other cracks, boundaries, loads) is regular at the tip and has part in them only by these tractions. Where
+these depend on the jump, they grow like the root of the distance, and are interpolated by its powers at the tip.
 
 All is seen from the tip in units of a length: the tip at 0, the crack leaving it towards the negative real axis, its
 upper face on the left of the real axis's direction. A jump is that of the lower against the upper face, which are the
@@ -121,10 +122,24 @@ def _integrate_straight_crack(shape: TipShape) -> Real:
     low, high = np.abs(elements.start)[:, None], np.abs(elements.end)[:, None]
     along = (2 * distance - low - high) / (high - low)
     weight = half[:, None] * weights * (1 + np.cos(turn)) * np.sqrt(0.5 * length / np.pi)
-    powers = along[..., None] ** np.arange(len(shape.local))
-    of_node = np.einsum("eq,eqj->ej", weight, powers @ interpolate_shapes(shape.local)).ravel()
+    of_node = np.einsum("eq,eqj->ej", weight, interpolate_on_faces(shape, along)).ravel()
     total = of_node @ traction
     return np.stack([total.imag, total.real])
+
+
+def interpolate_on_faces(shape: TipShape, s: Real, slope: bool = False) -> Real:
+    """What the nodes' tractions (j,) make of those on the faces at s (e, q), or of their derivatives by s: (e, q, j).
+
+    Polynomials; on the first element of a `soft` tip, polynomials of the root of the distance.
+    """
+    powers = np.arange(len(shape.local))
+    terms = powers * s[..., None] ** np.maximum(powers - 1, 0) if slope else s[..., None] ** powers
+    values = np.asarray(terms @ interpolate_shapes(shape.local))
+    if shape.soft:
+        away, at_nodes = 0.5 * (1 + s[0, :, None]), 0.5 * (1 + shape.local[:, None])
+        at_tip = 0.25 * powers * away ** (0.5 * powers - 1) if slope else away ** (0.5 * powers)
+        values[0] = np.linalg.solve((at_nodes ** (0.5 * powers)).T, at_tip.T).T
+    return values
 
 
 class _Near:
@@ -176,7 +191,8 @@ class _Near:
                                    - (np.conj(dual[1])[:, None] * (self.moved - rest)).real)
             # On the lower face t* is the same and u* the opposite.
             dual = evaluate_eigenfield(amplitude, -0.5, points, turn, 1j * tangent, kappa)
-            total += 2 * (self._gather(weight * np.conj(dual[0]), s) @ self.on_faces).real
+            of_node = np.einsum("eq,eqj->ej", weight * np.conj(dual[0]), interpolate_on_faces(self.shape, s)).ravel()
+            total += 2 * (of_node @ self.on_faces).real
             total -= 2 * (self._gather(weight * np.conj(dual[1]), s) @ (self.mean - rest)).real
             rows.append(total / (-8 * np.pi))
         return np.sqrt(2 * np.pi) * np.stack([rows[0], -rows[1]])
@@ -210,12 +226,12 @@ class _Near:
         ahead, aside = a.real, -a.imag
         g: Complex = a * (stretched * aside - along * ahead) + 1j * a * (along * aside - normal * ahead)
         s, weight = self._divide_faces(by_length=False)
-        slope = self._spread_over_nodes(self._differentiate(s), weight)
+        slope = self._spread_over_nodes(interpolate_on_faces(self.shape, s, slope=True), weight)
         jumps = self._jumps(s)
         form = -_multiply(slope @ g, jumps)
         # Between elements, and where the circle cuts the last.
         ends = np.stack([np.full(len(s), -1.0), self.last], axis=1)
-        values = self._spread_over_nodes(self._interpolate(ends), np.ones_like(ends)) @ g
+        values = self._spread_over_nodes(interpolate_on_faces(self.shape, ends), np.ones_like(ends)) @ g
         at_ends = self._jumps(ends)
         form += _multiply(values[-1:], at_ends[-1:])
         form -= _multiply(values[2::2] - values[1:-1:2], 0.5 * (at_ends[2::2] + at_ends[1:-1:2]))
@@ -236,12 +252,12 @@ class _Near:
         reach = length.max()
         degree = min(MOST_DEGREE, (2 * len(length) + 1) // 3)
 
-        def fit(degree: int) -> Real:
-            powers = (length[:, None] / reach) ** np.arange(min(degree, len(length) - 1) + 1)
+        def fit(degree: int, power: float = 1.0) -> Real:
+            powers = (length[:, None] / reach) ** (power * np.arange(min(degree, len(length) - 1) + 1))
             return np.asarray(np.linalg.pinv(weight[:, None] * powers) * weight)
 
         value, slope = np.zeros((2, len(self.tangent)))
-        value[:len(length)] = fit(degree - 1)[0]
+        value[:len(length)] = (fit(degree, 0.5) if self.shape.soft else fit(degree - 1))[0]
         if len(length) > 1:
             slope[:len(length)] = fit(degree)[1] / reach
         a = self.tangent[:, None]
@@ -278,10 +294,6 @@ class _Near:
     def _interpolate(self, s: Real) -> Real:
         """The nodes' polynomials (e, q, j) at s (e, q)."""
         return np.asarray(s[..., None] ** self._powers @ self._coefficients)
-
-    def _differentiate(self, s: Real) -> Real:
-        """Their derivatives by s."""
-        return np.asarray(self._powers * s[..., None] ** np.maximum(self._powers - 1, 0) @ self._coefficients)
 
     def _gather(self, weight: Complex, s: Real) -> Complex:
         """Weights of the nodes from weights of the points s (e, q)."""

@@ -31,6 +31,8 @@ MOST_WHOLE = 100
 UNEVEN = 0.1
 # Cracks whose elements are the same to this part of their lengths share their forms.
 ALIKE = 1e-9
+# Laws of faces whose tractions follow the jump; those of others do with elastic joints, or weakening by slip.
+MOVING = ("cohesive", "barton_bandis", "custom")
 
 
 @dataclass(frozen=True)
@@ -205,9 +207,11 @@ def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pa
     region = mesh.region[paths.elements[:, 0]]
     tip = np.where(paths.outward, mesh.tip[paths.elements], np.array([0, 2, 1])[mesh.tip[paths.elements]])
     chord = seen.end - seen.start
+    # The nodes of an element belong to one curve.
+    soft = _list_soft(model, mesh)[mesh.pairs.interface[pair_of[paths.elements[:, 0] * (mesh.order + 1)]]]
     columns = np.column_stack([
         np.round(chord[:, 1:] / chord[:, :-1] / ALIKE), np.round(seen.turns / ALIKE), np.round(paths.cut_at / ALIKE),
-        paths.cut, paths.near, paths.whole, tip,
+        paths.cut, paths.near, paths.whole, tip, soft,
     ]) + 0.0  # fmt: skip
     alike: dict[tuple[Material, bytes], list[int]] = {}
     for place, row in enumerate(np.ascontiguousarray(columns, dtype=complex)):
@@ -219,13 +223,21 @@ def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pa
         shape = TipShape(
             deepcopy(seen.select(first)), tip[first].copy(),
             mesh.crack_local, material.kappa, bool(paths.whole[first]), int(paths.near[first]), int(paths.cut[first]),
-            float(paths.cut_at[first]),
+            float(paths.cut_at[first]), bool(soft[first]),
         )  # fmt: skip
         pair = pair_of[_list_outward(mesh, paths.elements[at], paths.outward[at])].astype(np.int32)
         sense = np.repeat(np.where(paths.outward[at], 1, -1).astype(np.int8), mesh.order + 1, axis=1)
         groups.append(_Alike(TipForms(shape), material, number[paths.tip[at]], region[at], place_of[at],
                              direction[at], length[at], pair, sense))
     return groups
+
+
+def _list_soft(model: Model, mesh: Mesh) -> Bool:
+    """Of every interface, whether what its faces carry where they hold or slide depends on how far they have moved."""
+    laws = (model.interfaces[name].law if name in model.interfaces else None for name in mesh.interface_names)
+    return np.array([law is not None and bool(
+        law.normal_stiffness or law.tangential_stiffness or law.slip_distance or law.kind in MOVING
+    ) for law in laws], dtype=bool)
 
 
 def _see_from_tip(mesh: Mesh, paths: TipPaths) -> tuple[Elements, Complex, Complex, Real]:

@@ -1,7 +1,7 @@
 """K, J and T of cracks whose faces carry more the further they move: elastic joints, friction that weakens with slip.
 
-The jump of a straight crack is sum c_n sqrt(a^2 - x^2) U_n(x/a), the traction that it makes E'/(4 a) sum (n + 1) c_n U_n
-times a; with faces that carry k times the jump, the c_n follow at Chebyshev points, to all digits.
+The jump of a straight crack is sum c_n sqrt(a^2 - x^2) U_n(x/a), the traction that it makes E'/(4 a) sum (n + 1) c_n
+U_n times a; with faces that carry k times the jump, the c_n follow at Chebyshev points, to all digits.
 """
 
 from __future__ import annotations

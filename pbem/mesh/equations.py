@@ -32,7 +32,7 @@ def choose_equations(model: Model) -> Equations:
     that an inner loop always keeps the displacement equation; with DBEM the side across it takes the traction equation.
     Traction equations on both faces of a narrow slot say nearly the same: there one of the faces keeps the displacement
     equation, as on the faces of a crack; both do on the faces of a thin part, which a traction equation hardly bends.
-    The same holds for faces beside a crack of the region.
+    The same holds for faces beside a crack of the region, or beside a slot.
     Elements at corners, ends of contact and changes of condition keep the displacement equation, see `_keep_ends`.
     """
     inner = find_inner_curves(model)
@@ -48,7 +48,10 @@ def choose_equations(model: Model) -> Equations:
         strips = find_strips(model, region, asked) if len(asked) > 1 else []
         kept = _cover_strips(strips)
         notes += _explain_strips(model, region, strips, kept)
-        beside = find_legs_beside_cracks(model, region, [leg for leg in asked if leg not in kept])
+        # Of the faces of a slot one takes the traction equation, as of those of a crack.
+        slots = {leg: None for strip in strips if not strip.inside for leg in (strip.first, strip.second)}
+        others = [leg for leg in asked if leg not in kept and leg not in slots]
+        beside = find_legs_beside_cracks(model, region, others, [leg for leg in slots if leg in kept])
         notes += _explain_beside(model, region, beside)
         kept = kept.union(beside)
         for curve in {curve for curve, _ in kept}:

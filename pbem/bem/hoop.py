@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,8 @@ from pbem.mesh.mesh import Mesh, second_face_nodes
 
 # Directions that differ by less (radians) are one: rounding of places far from the origin.
 SMOOTH = 1e-6
+# Elements whose derivatives are formed at a time; of meshes of no more what these take is kept.
+AT_A_TIME = 1024
 
 
 def evaluate_hoop_stress(
@@ -94,65 +96,96 @@ def evaluate_stretch(mesh: Mesh, displacement: Complex) -> tuple[Complex, Comple
     Both are taken along the mesh's elements, so that those of second faces are against their travel.
     """
     second = second_face_nodes(mesh)
-    first, opposite = split_faces(mesh, displacement)
-    mean = _differentiate_along(mesh, 0.5 * (first + opposite), False)
-    half_jump = _differentiate_along(mesh, 0.5 * (first - opposite), True)
+    mean, half_jump = differentiate_faces(mesh, displacement)
     along = 1j * mesh.normal
     stretch = np.concatenate([mean + half_jump, (mean - half_jump)[second]])
     return stretch, np.concatenate([along, along[second]])
 
 
-def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Complex:
-    """Derivative of nodal values (nodes,) by the length in the direction of travel."""
+def differentiate_faces(mesh: Mesh, displacement: Complex) -> tuple[Complex, Complex]:
+    """Derivatives (nodes,) by the length in the direction of travel, of the mean of the displacements (f,) of both
+    faces and of half of the first's less the second's; where there is one face alone, of its own and nothing."""
+    first, opposite = split_faces(mesh, displacement)
+    mean, half_jump = 0.5 * (first + opposite), 0.5 * (first - opposite)
     if mesh.order == 0:
-        return _difference_neighbours(mesh, values)
-    shapes = mesh.keep("derivatives", _derive_shapes)
-    nodal = values.reshape(mesh.elements, -1)
-    derivative = np.einsum("epj,ej->ep", shapes.of_jumps if with_tips else shapes.plain, nodal) / shapes.stretch
-    if not with_tips:
-        former, inner, latter = shapes.patches
-        known = np.concatenate([nodal[former, -1:], nodal[inner], nodal[latter, :1]], axis=1)
-        derivative[inner] = np.einsum("epj,ej->ep", shapes.of_patches, known) / shapes.lengths[:, None]
-    return np.asarray(derivative).ravel()
+        return _difference_neighbours(mesh, mean), _difference_neighbours(mesh, half_jump)
+    nodal = [each.reshape(mesh.elements, -1) for each in (mean, half_jump)]
+    found = [np.empty_like(each) for each in nodal]
+    for shapes in _list_shapes(mesh):
+        found[0][shapes.own] = shapes.differentiate(nodal[0])
+        found[1][shapes.own] = shapes.differentiate_jumps(nodal[1])
+    return found[0].ravel(), found[1].ravel()
 
 
 @dataclass(frozen=True)
 class _Shapes:
-    """What derivatives of nodal values along the elements (e,) of a mesh take.
+    """What derivatives of nodal values along elements own (e,) of a mesh take.
 
     plain, of_jumps (e, p + 1, p + 1): derivatives by s at the nodes, of the element's polynomials, with the square-root
     shape at tips for jumps; stretch (e, p + 1): length by s. patches (3, k): numbers of elements that go on smoothly
-    at both ends, between those before and after them; of_patches (k, p + 1, p + 3): derivatives there, by the length
-    over that of the element (k,), of the polynomials through the own nodes and the nearest of each neighbour.
+    at both ends, between those before and after them; place (k,): of these among the own; of_patches
+    (k, p + 1, p + 3): derivatives there, by the length over that of the element (k,), of the polynomials through the
+    own nodes and the nearest of each neighbour.
     """
 
+    own: Integer
     plain: Real
     of_jumps: Real
     stretch: Real
     patches: Integer
+    place: Integer
     of_patches: Real
     lengths: Real
 
+    def differentiate(self, nodal: Complex) -> Complex:
+        """Derivatives (e, p + 1) by the length for values at the nodes of all elements of the mesh."""
+        derivative: Complex = np.einsum("epj,ej->ep", self.plain, nodal[self.own]) / self.stretch
+        former, inner, latter = self.patches
+        known = np.concatenate([nodal[former, -1:], nodal[inner], nodal[latter, :1]], axis=1)
+        derivative[self.place] = np.einsum("epj,ej->ep", self.of_patches, known) / self.lengths[:, None]
+        return derivative
 
-def _derive_shapes(mesh: Mesh) -> _Shapes:
-    local = locate_nodes(mesh)
+    def differentiate_jumps(self, nodal: Complex) -> Complex:
+        """The same of jumps, with the shape of those at tips."""
+        return np.asarray(np.einsum("epj,ej->ep", self.of_jumps, nodal[self.own]) / self.stretch)
+
+
+def _list_shapes(mesh: Mesh) -> Iterator[_Shapes]:
+    """Those of all elements; of large meshes some elements at a time, as they take more room than the mesh itself."""
+    if mesh.elements <= AT_A_TIME:
+        yield mesh.keep("derivatives", lambda mesh: _derive_shapes(
+            mesh, np.arange(mesh.elements), _find_smooth_joints(mesh)))
+        return
+    following = _find_smooth_joints(mesh)
+    for begin in range(0, mesh.elements, AT_A_TIME):
+        yield _derive_shapes(mesh, np.arange(begin, min(begin + AT_A_TIME, mesh.elements)), following)
+
+
+def _derive_shapes(mesh: Mesh, own: Integer, following: Integer) -> _Shapes:
+    """Those of some elements, rising; following (elements,): see `_find_smooth_joints`."""
+    local, tip = locate_nodes(mesh, own), mesh.tip[own]
     plain = of_jumps = differentiate_at_nodes(local)
-    tips = np.flatnonzero(mesh.tip)
+    tips = np.flatnonzero(tip)
     if len(tips):
         of_jumps = plain.copy()
-        of_jumps[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
-    following = _find_smooth_joints(mesh)
+        of_jumps[tips] = differentiate_tips(tip[tips], local[tips], local[tips])
     before = np.full(mesh.elements, -1)
     before[following[following >= 0]] = np.flatnonzero(following >= 0)
-    inner = np.flatnonzero((following >= 0) & (before >= 0))
+    place = np.flatnonzero((following[own] >= 0) & (before[own] >= 0))
+    inner = own[place]
     former, latter = before[inner], following[inner]
-    # Lengths from the start.
-    length = mesh.geometry.lengths
-    along = mesh.geometry.fractions(local) * length[:, None]
-    places = np.concatenate([along[former, -1:] - length[former, None], along[inner],
-                             along[latter, :1] + length[inner, None]], axis=1) / length[inner, None]
-    return _Shapes(plain, of_jumps, mesh.geometry.stretch(local), np.stack([former, inner, latter]),
-                   differentiate_at_nodes(places)[:, 1:-1], length[inner])
+
+    def measure_along(numbers: Integer) -> tuple[Real, Real]:
+        """Lengths of elements (k, 1), and those from their starts to their nodes."""
+        some = mesh.geometry.select(numbers)
+        length = some.lengths[:, None]
+        return length, some.fractions(locate_nodes(mesh, numbers)) * length
+
+    (length_before, along_before), (length, along) = measure_along(former), measure_along(inner)
+    places = np.concatenate([along_before[:, -1:] - length_before, along,
+                             measure_along(latter)[1][:, :1] + length], axis=1) / length
+    return _Shapes(own, plain, of_jumps, mesh.geometry.select(own).stretch(local), np.stack([former, inner, latter]),
+                   place, differentiate_at_nodes(places)[:, 1:-1], length[:, 0])
 
 
 def _find_smooth_joints(mesh: Mesh) -> Integer:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.mesh import Mesh, second_face_nodes
 
 
-def locate_nodes(mesh: Mesh) -> Real:
-    """The coordinates s (e, p + 1) of all nodes on their elements."""
-    return mesh.geometry.preimage(mesh.position.reshape(mesh.elements, -1)).real
+def locate_nodes(mesh: Mesh, elements: Integer | None = None) -> Real:
+    """The coordinates s (e, p + 1) of all nodes on their elements, or of the nodes of some elements (e,)."""
+    position = mesh.position.reshape(mesh.elements, -1)
+    if elements is None:
+        return mesh.geometry.preimage(position).real
+    return mesh.geometry.select(elements).preimage(position[elements]).real
 
 
 def interpolate(local: Real, s: Real) -> Real:

@@ -18,6 +18,7 @@ from pbem.contact.loads import Load
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Balance
+from pbem.uniform import repeat_value
 
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
@@ -30,8 +31,8 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions)
 
     (theory, 72)
     """
-    mesh, count = problem.mesh, len(problem.mesh.region_names)
-    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    count = len(problem.mesh.region_names)
+    whole, known = _read_tractions(problem, v, load)
     least = _find_least_traction(problem, v, np.abs(whole).max(initial=0.0))
     faces, of = _collect_faces(problem, whole, known)
     regions = _add_up(faces, of, count, least)
@@ -65,7 +66,7 @@ def measure_friction(problem: Problem, v: Real, load: Load, p_s: Real) -> Real:
     p_s (m,): shear tractions of slipping pairs, else 0. What anchors carry of a turn is wrong if not small against it.
     """
     mesh, count = problem.mesh, len(problem.mesh.region_names)
-    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    whole, known = _read_tractions(problem, v, load)
     faces, of = _collect_faces(problem, whole, known)
     forces = _add_up(faces, of, count, _find_least_traction(problem, v, np.abs(whole).max(initial=0.0))).forces
     friction = np.zeros(count)
@@ -73,6 +74,15 @@ def measure_friction(problem: Problem, v: Real, load: Load, p_s: Real) -> Real:
     for side in (mesh.pairs.first, mesh.pairs.second):
         np.add.at(friction, mesh.node_region[side], mesh.pairs.weight * borne)
     return _divide(friction, forces)
+
+
+def _read_tractions(problem: Problem, v: Real, load: Load) -> tuple[Complex, Complex]:
+    """Tractions (nodes,) of v (4 nodes,), and those of fields in finite balance; these take no room where there are
+    none."""
+    first = 2 * problem.mesh.nodes
+    known = load.known[first::2] + 1j * load.known[first + 1 :: 2] if load.known.any() else None
+    return (v[first::2] + 1j * v[first + 1 :: 2],
+            repeat_value(0.0, problem.mesh.nodes, complex) if known is None else known)
 
 
 def _balance_tools(problem: Problem, regions: _Sums, load: Load) -> _Sums:
@@ -123,11 +133,13 @@ def _collect_faces(problem: Problem, whole: Complex, known: Complex) -> tuple[_F
     """All faces, and the regions that they bound (n,), in rising order; tractions are given at the nodes."""
     mesh = problem.mesh
     node = np.concatenate([np.arange(mesh.nodes), np.flatnonzero(mesh.node_crack)])
-    sign = np.where(np.arange(len(node)) < mesh.nodes, 1.0, -1.0)
+    sign = np.where(np.arange(len(node)) < mesh.nodes, 1, -1).astype(np.int8)
     order = np.argsort(mesh.node_region[node], kind="stable")
     node, sign = node[order], sign[order]
+    del order
     faces = _Faces(
-        node, mesh.position[node], mesh.weight[node], sign * whole[node], sign * known[node], ~mesh.node_crack[node]
+        node, mesh.position[node], mesh.weight[node], sign * whole[node],
+        sign * known[node] if known.any() else repeat_value(0.0, len(node), complex), ~mesh.node_crack[node],
     )
     return faces, mesh.node_region[node]
 
@@ -192,7 +204,7 @@ def _add_up(
         middles = np.full(count, middle)
     lever = faces.position - middles[of]
     whole, known = faces.traction, faces.known
-    elastic = whole - known
+    elastic = whole - known if any(known.strides) else whole
     # Loads of which none is left over on a body are no less a measure of its errors: fluid on both faces of a crack,
     # in-situ stress.
     return _Sums(

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.bem.hoop import evaluate_stretch
+from pbem.bem.hoop import differentiate_faces
 from pbem.geometry.tolerance import TIE
-from pbem.mesh.mesh import Mesh, list_faces
+from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.solve.problem.step import Linearity
 
 # Strains and rotations (radians) beyond which linear theory no longer holds.
@@ -20,12 +20,12 @@ EXCEEDED_ON = 0.01
 
 def measure_linearity(mesh: Mesh, displacement: Complex, slip: Real) -> Linearity:
     """Of the displacement (f,) at the nodes of `list_faces(mesh)` and the slip (m,) of all pairs."""
-    faces = list_faces(mesh)
-    stretch, direction = evaluate_stretch(mesh, displacement)
-    gradient = np.conj(direction) * stretch
-    count = len(mesh.region_names)
-    strain = _find_exceeded(np.abs(gradient.real), faces.region, faces.weight, count)
-    rotation = _find_exceeded(np.abs(gradient.imag), faces.region, faces.weight, count)
+    # On every rank beside its matrices: no more at a time than has to be.
+    stretched, turned = _measure_gradients(mesh, displacement)
+    count, second = len(mesh.region_names), second_face_nodes(mesh)
+    region = np.concatenate([mesh.node_region, mesh.node_region[second]])
+    length = np.concatenate([mesh.weight, mesh.weight[second]])
+    strain, rotation = (_find_exceeded(each, region, length, count) for each in (stretched, turned))
     pairs, interfaces = mesh.pairs, len(mesh.interface_names)
     weight = np.where(pairs.crack, mesh.weight[pairs.first], pairs.weight)
     elements = np.maximum(np.bincount(pairs.interface, minlength=interfaces) / (mesh.order + 1), 1.0)
@@ -34,6 +34,15 @@ def measure_linearity(mesh: Mesh, displacement: Complex, slip: Real) -> Linearit
     np.maximum.at(largest, pairs.interface, np.abs(slip))
     relative = np.divide(largest, length, out=np.zeros(interfaces), where=length > 0)
     return Linearity(strain, rotation, relative)
+
+
+def _measure_gradients(mesh: Mesh, displacement: Complex) -> tuple[Real, Real]:
+    """The sizes (f,) of the stretch of all faces along themselves, and of what they turn by."""
+    mean, half_jump = differentiate_faces(mesh, displacement)
+    back = np.conj(1j * mesh.normal)
+    sides = back * (mean + half_jump), (back * (mean - half_jump))[second_face_nodes(mesh)]
+    return (np.concatenate([np.abs(each.real) for each in sides]),
+            np.concatenate([np.abs(each.imag) for each in sides]))
 
 
 def _find_exceeded(values: Real, region: Integer, weight: Real, regions: int) -> Real:
@@ -46,7 +55,7 @@ def _find_exceeded(values: Real, region: Integer, weight: Real, regions: int) ->
     at = np.clip(at, first[:-1], np.maximum(first[1:] - 1, first[:-1]))
     there = first[1:] > first[:-1]
     result = np.zeros(regions)
-    result[there] = values[order][at[there]]
+    result[there] = values[order[at[there]]]
     return result
 
 

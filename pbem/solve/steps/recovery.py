@@ -33,18 +33,10 @@ def describe_step(
     from 0: enough for energies, in which it has no part, and for all that follows from jumps and tractions.
     """
     mesh = problem.mesh
-    values = solution.v[0::2] + 1j * solution.v[1::2]
-    displacement, traction = values[: mesh.nodes].copy(), values[mesh.nodes :]
-    cracks = problem.all_crack_nodes
-    jump = displacement[cracks]
-    load = problem.evaluate_load(stage, factor)
-    mean = _recover_means(problem, solution.v, load) if recover else np.zeros(len(jump), dtype=complex)
-    displacement[cracks] = mean + jump / 2
-    opposite = np.zeros(mesh.nodes, dtype=complex)
-    opposite[cracks] = mean - jump / 2
-    order = problem.second_faces
+    traction = _name_vectors(solution.v[2 * mesh.nodes :])
+    load, order = problem.evaluate_load(stage, factor), problem.second_faces
     pairs = solution.pairs
-    everywhere = np.concatenate([displacement, opposite[order]])
+    everywhere = _collect_displacement(problem, solution.v, load, recover)
     free = problem.find_free_motions(stick_bonded(problem.laws, memory, solution.modes))
     reactions: dict[str, Real] = {}
     settled = settle(problem, load, everywhere, traction, stage, factor, free.motions if free.unheld is None else ())
@@ -54,6 +46,9 @@ def describe_step(
         everywhere, reactions = everywhere + settled.displacement, settled.reactions
         memory = commit(problem.laws, solution.memory, solution.modes, pairs, solution.pressure)
     shown = pairs if problem.arrangement is None else problem.arrangement.blank(pairs)
+    # Before the tractions of all faces are there: every rank has these beside its matrices.
+    balance = measure_balance(problem, solution.v, load, free)
+    linearity = measure_linearity(mesh, everywhere, shown.g_s)
     step = Step(
         number=number,
         stage=stage,
@@ -70,12 +65,27 @@ def describe_step(
             traction_s=shown.p_s,
             internal=memory.internal,
         ),
-        balance=measure_balance(problem, solution.v, load, free),
-        linearity=measure_linearity(mesh, everywhere, shown.g_s),
+        balance=balance,
+        linearity=linearity,
         duration=solution.memory.duration,
         support_reactions=reactions,
     )
     return step, memory
+
+
+def _name_vectors(values: Real) -> Complex:
+    return np.asarray(values[0::2] + 1j * values[1::2])
+
+
+def _collect_displacement(problem: Problem, v: Real, load: Load, recover: bool) -> Complex:
+    """Displacements (f,) of all faces from v (4 nodes,); recover: see `describe_step`."""
+    displacement, cracks = _name_vectors(v[: 2 * problem.mesh.nodes]), problem.all_crack_nodes
+    jump = displacement[cracks]
+    mean = _recover_means(problem, v, load) if recover else np.zeros(len(jump), dtype=complex)
+    displacement[cracks] = mean + jump / 2
+    opposite = np.zeros(problem.mesh.nodes, dtype=complex)
+    opposite[cracks] = mean - jump / 2
+    return np.concatenate([displacement, opposite[problem.second_faces]])
 
 
 def _recover_means(problem: Problem, v: Real, load: Load) -> Complex:

@@ -32,7 +32,7 @@ from pbem.pass_file import PassFile, expect_writer, keep_waiting, write_pass
 from pbem.passes import Finer, Target, blame_tries, plan_finer, plan_graded, recall_mesh
 from pbem.results.accuracy import Decision, Pass, decide, refine_marked
 from pbem.results.contact_ends import find_contact_ends
-from pbem.results.doubts import find_smooth
+from pbem.results.doubts import find_long, find_smooth
 from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
 from pbem.results.output import check_output_path
@@ -40,7 +40,7 @@ from pbem.results.overrides import choose_overrides
 from pbem.results.passes import expect_no_pass, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.resume import is_finished
-from pbem.results.tip_notes import compare_release
+from pbem.results.tip_notes import doubt_factors
 from pbem.results.writer import ResultWriter
 from pbem.solve.launch.account import describe_start
 from pbem.solve.launch.arguments import check_arguments
@@ -122,7 +122,7 @@ def run(
                 _refine_and_solve(model, Target(target, resume, force), options, watch, signals, placement, kept)
             with clock.piece("writing"):
                 results = open_results(target)
-                for note in do_on_first(comm, PbemError, lambda: compare_release(results)):
+                for note in do_on_first(comm, PbemError, lambda: doubt_factors(results)):
                     watch.note(note)
             return results
     except StopError as error:
@@ -168,9 +168,10 @@ def _refine_and_solve(
         anew = one.number == begun and not tries
         for line in (*describe_start(watch.comm), describe_size(model, mesh)) if anew else ():
             watch.tell(line)
-        for note in (*notes, *mesh.notes, *placement, *remarks) if anew else ():
+        of_mesh = (*mesh.notes, *find_long(model, mesh))
+        for note in (*notes, *of_mesh, *placement, *remarks) if anew else ():
             watch.note(note)
-        watch.notes = dict.fromkeys((*notes, *model.notes, *mesh.notes))  # of the file, not of the machine
+        watch.notes = dict.fromkeys((*notes, *model.notes, *of_mesh))  # of the file, not of the machine
         now = replace(one, first_unknowns=one.first_unknowns or 2 * mesh.nodes)
         try:
             with _keep_if_ended(former):

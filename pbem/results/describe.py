@@ -18,7 +18,7 @@ from pbem.results.text_tables import format_number as _number
 from pbem.results.text_tables import section as _section
 from pbem.results.text_tables import shorten as _shorten
 from pbem.results.text_tables import table as _table
-from pbem.results.tip_notes import compare_release, explain_missing_factors
+from pbem.results.tip_notes import doubt_factors, explain_missing_factors
 from pbem.results.trace_names import name_trace
 from pbem.results.traces import list_traces
 from pbem.solve.steps.open_faces import describe_pushed
@@ -220,7 +220,7 @@ def _describe_tips(results: Results) -> list[str]:
         shown = sorted(found, key=lambda tip: np.hypot(tip[2], tip[3]), reverse=True)[:MOST_TIPS]
     rows = [[name, end, *map(_number, values)] for name, end, *values in shown]
     left_out = len(found) - len(shown)
-    notes = [*compare_release(results), *explain_missing_factors(results)]
+    notes = [*doubt_factors(results), *explain_missing_factors(results)]
     return [
         *_table(["crack", "tip", "KI", "KII", "J", "T"], rows),
         *([f"... and {left_out} smaller ones"] if left_out else []), *notes,

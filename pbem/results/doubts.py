@@ -20,7 +20,7 @@ ZONE_ELEMENTS = 3
 def list_doubts(model: Model, mesh: Mesh) -> list[str]:
     """A sentence for each: friction that was forgotten, contact on fewer elements than resolve it, bonds that soften
     over less than an element."""
-    return [*find_smooth(model), *_find_sparse(model, mesh), *_find_long(model, mesh)]
+    return [*find_smooth(model), *_find_sparse(model, mesh), *find_long(model, mesh)]
 
 
 def find_smooth(model: Model) -> list[str]:
@@ -55,8 +55,8 @@ def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
     ]
 
 
-def _find_long(model: Model, mesh: Mesh) -> list[str]:
-    """Cohesive faces whose elements are too long for the zone that softens, E' G/strength^2."""
+def find_long(model: Model, mesh: Mesh) -> list[str]:
+    """A sentence for each: cohesive faces whose elements are too long for the zone that softens, E' G/strength^2."""
     length, told = np.abs(mesh.end - mesh.start)[mesh.pairs.slave // (mesh.order + 1)], []
     for name, part in zip(mesh.interface_names, _split(mesh), strict=True):
         law = find_joint(model, name).law

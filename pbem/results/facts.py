@@ -14,7 +14,7 @@ from pbem.results.configuration import to_plain
 from pbem.results.pushed_faces import find_pushed_faces
 from pbem.results.reader import Results
 from pbem.results.rigid import COMPONENTS
-from pbem.results.tip_notes import compare_release, explain_missing_factors
+from pbem.results.tip_notes import doubt_factors, explain_missing_factors
 from pbem.results.traces import list_traces
 from pbem.solve.steps.open_faces import describe_pushed
 
@@ -73,7 +73,7 @@ def _collect_last(results: Results, traces: int | None) -> dict[str, Any]:
         "linearity": _collect_linearity(results),
         "errors": {"missing": results.errors.missing,
                    "relative": {kind: np.max(values) for kind, values in results.errors.relative.items()}},
-        "notes": [*compare_release(results), *explain_missing_factors(results),
+        "notes": [*doubt_factors(results), *explain_missing_factors(results),
                   *(f"{text[0].upper()}{text[1:]}." for text in describe_pushed(find_pushed_faces(results))),
                   *results.notes],
     }

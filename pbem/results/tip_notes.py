@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
+from dataclasses import dataclass
 
 import numpy as np
 
 from pbem.arrays import Integer
+from pbem.contact.laws import OPEN
 from pbem.results.reader import Results
 from pbem.wording import list_names, write_percent
 
@@ -18,7 +21,49 @@ SMALL = 1e-6
 ROUNDING = 1e-6
 MOST_NAMES = 8
 ENDS = ("start", "end")
+# K of a tip with an elastic joint is right within 2 % on elements of this part of E' over its stiffness, by the order.
+MOST_OF_ZONE = (0.01, 0.15, 0.6, 1.5)
 ALONG = "a crack along an interface ends there, whose field oscillates if the materials differ; J is what it releases"
+
+
+def doubt_factors(results: Results) -> list[str]:
+    """What the user of K and J at the last stored step should know of the elements that they were found on."""
+    return [*compare_release(results), *_find_stiff_joints(results)]
+
+
+def _find_stiff_joints(results: Results) -> list[str]:
+    """A sentence if elastic joints take up K within a distance E' over their stiffness from a tip that the elements do
+    not resolve: K and J are both too small there, and agree."""
+    if not len(results.steps) or not results.tips:
+        return []
+    stored = json.loads(results.configuration or "{}").get("interfaces", {})
+    joints = {name: [stored.get(name, {}).get("law", {}).get(f"{which}_stiffness") or 0.0
+                     for which in ("normal", "tangential")] for name in results.tips}
+    if not any(any(each) for each in joints.values()):
+        return []
+    found, ends = [], _find_crack_ends(results)
+    allowed = MOST_OF_ZONE[results.nodes.order]
+    pairs, is_open = results.pairs, results.pairs.at("mode", -1) == OPEN
+    bounds = np.searchsorted(pairs.interface, np.arange(len(pairs.names) + 1))
+    beside = {name: (first, last - 1) for name, first, last in zip(pairs.names, bounds, bounds[1:], strict=False)}
+    for name, tips in results.tips.items():
+        if name not in ends:
+            continue
+        for at, length in enumerate(ends[name].lengths):
+            stiff = max((joint for joint, K in zip(joints[name], (tips.KI, tips.KII), strict=True)
+                         if np.nan_to_num(K[-1, at])), default=0.0)
+            # Open faces carry nothing.
+            if not is_open[beside[name][at]] and stiff * length > allowed * tips.plane_modulus:
+                found.append((tips.plane_modulus / stiff / length, f"'{name}' ({ENDS[at]})"))
+    if not found:
+        return []
+    found.sort()
+    names = list_names([name for _, name in found], MOST_NAMES)
+    return [
+        f"K, J and T at {names} are too small: elements there are up to {1 / found[0][0]:.3g} times as long as E' over "
+        "the stiffness of the elastic joint, the distance from the tip within which it takes up the stress; K is right "
+        f"within 2 % with elements of less than {allowed:g} times that distance (order {results.nodes.order})."
+    ]
 
 
 def compare_release(results: Results) -> list[str]:
@@ -60,7 +105,7 @@ def explain_missing_factors(results: Results) -> list[str]:
         if name not in ends:
             if not np.isnan(results.tips[name].J[-1, end]):
                 reasons[ALONG].append(f"'{name}' ({ENDS[end]})")
-        elif (reason := _find_reason(results, name, meeting[ends[name][end]])):
+        elif (reason := _find_reason(results, name, meeting[ends[name].places[end]])):
             reasons[reason].append(f"'{name}' ({ENDS[end]})")
     return [f"No K at {list_names(names, MOST_NAMES)}: {reason}." for reason, names in reasons.items()]
 
@@ -84,15 +129,25 @@ def _collect_vertices(results: Results) -> dict[tuple[float, ...], list[int]]:
     return meeting
 
 
-def _find_crack_ends(results: Results) -> dict[str, tuple[tuple[float, ...], tuple[float, ...]]]:
+@dataclass(frozen=True)
+class _Ends:
+    """places: of a crack's start and end; lengths: of the elements there."""
+
+    places: tuple[tuple[float, ...], tuple[float, ...]]
+    lengths: tuple[float, float]
+
+
+def _find_crack_ends(results: Results) -> dict[str, _Ends]:
     elements = results.elements
     first = np.flatnonzero(elements.crack)[: int(elements.crack.sum()) // 2]
     ends = {}
     for number in np.unique(elements.curve[first]):
         own = first[elements.curve[first] == number]  # in the direction of the curve
-        ends[results.nodes.curve_names[number]] = (
-            tuple(elements.vertices[own[0], 0].tolist()), tuple(elements.vertices[own[-1], 1].tolist())
-        )  # fmt: skip
+        first_one, last_one = elements.vertices[own[0]], elements.vertices[own[-1]]
+        ends[results.nodes.curve_names[number]] = _Ends(
+            (tuple(first_one[0].tolist()), tuple(last_one[1].tolist())),
+            (float(np.hypot(*(first_one[1] - first_one[0]))), float(np.hypot(*(last_one[1] - last_one[0])))),
+        )
     return ends
 
 

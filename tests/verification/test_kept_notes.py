@@ -118,3 +118,16 @@ def test_notes_are_those_of_the_pass_that_is_stored(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(driver, "march", fail)
     stands = solve_pin(tmp_path)
     assert sum("The run on that mesh did not converge (mode cycle)" in note for note in stands.notes) == 1
+
+
+def test_elements_too_long_for_bonds_that_soften_are_told_by_the_run(tmp_path: Path) -> None:
+    listener = Noting()
+    results = pbem.run({
+        "materials": {"m": {"young": 1e3, "poisson": 0.25}},
+        "curves": {"crack": {"points": [[-1, 0], [1, 0]], "elements": 8}},
+        "regions": {"plane": {"material": "m", "infinite": True, "cracks": ["crack"]}},
+        "interfaces": {"crack": {"law": "cohesive", "tensile_strength": 1.0, "fracture_energy": 1e-4}},
+        "remote": {"syy": 0.5}, "analysis": {"steps": 1},
+    }, tmp_path / "bonds.h5", reporter=listener)  # fmt: skip
+    told = [note for note in listener.notes if "E' G/strength^2 = 0.107" in note]
+    assert len(told) == 1 and told[0] in results.notes

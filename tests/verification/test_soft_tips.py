@@ -1,7 +1,7 @@
 """K, J and T of cracks whose faces carry more the further they move: elastic joints, friction that weakens with slip.
 
-The jump of a straight crack is sum c_n sqrt(a^2 - x^2) U_n(x/a), the traction that it makes E'/(4 a) sum (n + 1) c_n
-U_n times a; with faces that carry k times the jump, the c_n follow at Chebyshev points, to all digits.
+The jump of a straight crack is sum c_n sqrt(a^2 - x^2) U_n(x/a), the traction that it makes E'/4 sum (n + 1) c_n U_n;
+with faces that carry k times the jump, the c_n follow at Chebyshev points, to all digits.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import pytest
 
 import pbem
 from pbem.results.contents import Tips
+from pbem.results.tip_notes import doubt_factors
 
 YOUNG, POISSON = 1e3, 0.25
 MODULUS = YOUNG / (1 - POISSON**2)
@@ -80,3 +81,20 @@ def test_a_crack_that_is_not_quite_straight(order: int, elements: int, tolerance
     np.testing.assert_allclose(tips.KI[-1], opening, rtol=tolerance)
     np.testing.assert_allclose(tips.KII[-1], sliding, rtol=tolerance)
     np.testing.assert_allclose(tips.J[-1], (opening**2 + sliding**2) / MODULUS, rtol=2.5 * tolerance)
+
+
+@pytest.mark.parametrize(("order", "elements", "wrong"), [(0, 16, True), (1, 8, True), (2, 4, True), (2, 16, False)])
+def test_tips_whose_joint_the_elements_do_not_resolve_are_told(
+    order: int, elements: int, wrong: bool, tmp_path: Path
+) -> None:
+    stiffness = 4e3
+    law = {"law": "bonded", "normal_stiffness": stiffness, "tangential_stiffness": 1e7}
+    tips = solve_crack(tmp_path, law, {"syy": 1.0}, [[-0.5, 0.0], [0.5, 0.0]], elements, order)
+    lack = 1 - tips.KI[-1, 0] / find_factor(1.0, stiffness, 0.5)
+    assert (lack > 0.02) == wrong
+    told = [note for note in doubt_factors(pbem.open_results(tmp_path / "crack.h5")) if "elastic joint" in note]
+    assert len(told) == wrong
+    law = {"friction": 0.3, "normal_stiffness": stiffness, "tangential_stiffness": 1e7}
+    solve_crack(tmp_path, law, {"syy": 1.0}, [[-0.5, 0.0], [0.5, 0.0]], elements, order)  # open
+    assert not any("elastic joint" in note for note in doubt_factors(pbem.open_results(tmp_path / "crack.h5")))
+    assert all("'crack' (start), 'crack' (end)" in note or "'crack' (end), 'crack' (start)" in note for note in told)

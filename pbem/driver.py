@@ -95,7 +95,7 @@ def run(
     petsc is not a dictionary, resume or force is neither True nor False, or kept is something else.
     """
     comm = check_communicator(comm)
-    check_arguments(operator, petsc, {"resume": resume, "force": force})
+    check_arguments(operator, petsc, {"resume": resume, "force": force}, reporter=reporter)
     if kept is not None and not isinstance(kept, KeptProblems):
         raise TypeError(f"kept: found {kept!r}; expected what earlier runs of a sweep have kept")
     path = find_file(case)

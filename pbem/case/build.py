@@ -87,7 +87,11 @@ def find_file(source: Source) -> Path | None:
     """The path of the case file, None of a case that was made by calls."""
     if isinstance(source, description.Case):
         return None if source.source == description.UNNAMED else Path(source.source)
-    return None if isinstance(source, Mapping) else locate(source)
+    if isinstance(source, Mapping):
+        return None
+    if not isinstance(source, str | os.PathLike):
+        raise TypeError(f"case: found {source!r}; expected a pbem.Case, a dictionary of its tables or a path")
+    return locate(source)
 
 
 def make_checked_model(

@@ -86,9 +86,9 @@ def _collect_contact(results: Results) -> dict[str, Any]:
         return {}
     mode, opening, slip = (pairs.at(quantity, -1) for quantity in ("mode", "opening", "slip"))
     rows = [np.bincount(pairs.interface[mode == which], minlength=count) for which in (STICK, SLIP, OPEN)]
-    largest = [np.zeros(count), np.zeros(count)]
-    for values, kept in zip((opening, slip), largest, strict=True):
-        np.maximum.at(kept, pairs.interface, np.abs(values))
+    largest = [np.full(count, -np.inf) for _ in range(2)]
+    for values, kept in zip((opening, np.abs(slip)), largest, strict=True):
+        np.fmax.at(kept, pairs.interface, values)
     total = np.bincount(pairs.interface, minlength=count)
     return {
         name: {"law": pairs.laws[i], "pairs": total[i], "stick": rows[0][i], "slip": rows[1][i], "open": rows[2][i],

@@ -118,7 +118,10 @@ class Results:
             return read_errors(file, len(self.steps))
 
     def displacement_at(self, step: int) -> Real:
-        """(n, 2) of one stored step (its index in the file, negative from the end) without loading the others."""
+        """(n, 2) of one stored step (its index in the file, negative from the end) without loading the others.
+
+        Raises IndexError for a step that is not stored, ValueError for what is no index.
+        """
         return self._read_at("fields/displacement", step)
 
     def traction_at(self, step: int) -> Real:
@@ -126,8 +129,9 @@ class Results:
         return self._read_at("fields/traction", step)
 
     def _read_at(self, name: str, step: int) -> Real:
+        (number,) = self.choose_steps([step])  # type: ignore[misc]
         with open_quietly(self.path) as file:
-            values: Real = file[name][range(len(self.steps))[step]]
+            values: Real = file[name][number]
         gone = self.find_gone(step)
         return np.where(gone[self.nodes.region, None], np.nan, values) if gone.any() else values
 
@@ -265,8 +269,11 @@ def _load_module(name: str) -> Any:
 def open_results(path: str | os.PathLike[str]) -> Results:
     """Open a result file, up to its last complete step if the run is in progress or was killed.
 
-    Raises ResultFileError if the file does not exist, is not a result file of pbem, or is damaged.
+    Raises ResultFileError if the file does not exist, is not a result file of pbem, or is damaged; TypeError if it is
+    no path.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"path: found {path!r}; expected the path of a result file")
     source = Path(path)
     if not os.path.isfile(source):  # also of names that no file can have
         raise ResultFileError(str(path), "no such file")

@@ -17,7 +17,8 @@ from pbem.results.trace_names import name_trace
 @dataclass(frozen=True)
 class TraceTotals:
     """pieces: how many interfaces it is made of. length; mean_slip, mean_opening: over the length, slip with its sign;
-    largest_slip, largest_opening: of all pairs, without sign. moment: shear modulus times the integral of the slip,
+    largest_slip: of all pairs, without sign; largest_opening: with its sign, negative where all are pushed into each
+    other or closed by elastic joints. moment: shear modulus times the integral of the slip,
     stress times length squared (per unit of thickness), with its sign."""
 
     name: str
@@ -49,9 +50,9 @@ def list_traces(results: Results, step: int = -1) -> list[TraceTotals]:
     integral = np.bincount(trace, rooted * slip, count)
     volume = np.bincount(trace, weigh_values("opening", opening, pairs.gap, (plain, rooted)), count)
     moment = np.bincount(trace, modulus * rooted * slip, count)
-    largest = [np.zeros(count), np.zeros(count)]
-    for values, kept in zip((slip, opening), largest, strict=True):
-        np.maximum.at(kept, trace, np.abs(values))
+    largest = [np.full(count, -np.inf) for _ in range(2)]
+    for values, kept in zip((np.abs(slip), opening), largest, strict=True):
+        np.maximum.at(kept, trace, values)
     pieces = np.bincount(of, minlength=count)
     found = [
         TraceTotals(name, int(pieces[i]), float(length[i]), float(integral[i] / length[i]), float(largest[0][i]),

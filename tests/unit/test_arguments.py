@@ -61,6 +61,25 @@ def test_steps_are_indices(results: Results) -> None:
     assert results.choose_steps(-1) == [1] and results.choose_steps([0, 1]) == [0, 1]
 
 
+@pytest.mark.parametrize("read", ["displacement_at", "traction_at"])
+def test_fields_of_a_step_that_is_not_stored_do_not_blame_the_file(results: Results, read: str) -> None:
+    for outside in (2, -3):
+        with pytest.raises(IndexError, match=f"there is no stored step with index {outside}; 2 are stored"):
+            getattr(results, read)(outside)
+    with pytest.raises(ValueError, match="expected indices of stored steps"):
+        getattr(results, read)(1.5)
+
+
+def test_what_is_no_case_no_file_and_no_reporter_is_told_as_that(tmp_path: Path) -> None:
+    for odd in (None, 3, []):
+        with pytest.raises(TypeError, match=r"case: found .*; expected a pbem.Case, a dictionary of its tables"):
+            pbem.run(odd, tmp_path / "a.h5")  # type: ignore[arg-type]
+        with pytest.raises(TypeError, match=r"path: found .*; expected the path of a result file"):
+            pbem.open_results(odd)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="reporter: found 'bar'; expected an object with at least one of the methods"):
+        pbem.run(tmp_path / "none.toml", reporter="bar")  # type: ignore[arg-type]
+
+
 def test_other_odd_options(results: Results, tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="kept: found 'seat'; expected what"):
         pbem.run(tmp_path / "none.toml", kept="seat")  # type: ignore[arg-type]

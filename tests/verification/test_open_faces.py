@@ -13,6 +13,7 @@ from pbem.contact.laws import OPEN
 from pbem.results.describe import describe_results
 from pbem.results.facts import collect_facts
 from pbem.results.pushed_faces import find_pushed_faces
+from pbem.results.traces import list_traces
 from pbem.solve.problem.step import SilentReporter
 
 MODULUS, POISSON = 1e3, 0.25
@@ -146,3 +147,13 @@ def test_open_cracks_that_cross_under_tension_are_not_told(tmp_path: Path) -> No
     results, notes = solve("\n".join(lines), tmp_path)
     assert not notes
     assert len(results.contact) > 3
+
+
+def test_the_largest_opening_of_pushed_faces_is_none_above_zero(tmp_path: Path) -> None:
+    """In the table of traces and for programs as in the table of contact."""
+    results, _ = solve(write_crack('law = "open"', "{ sxx = 0.0, syy = -1.0 }"), tmp_path)
+    least = results.contact["crack"].opening[-1].max()
+    assert least < 0 and least == pytest.approx(0.0, abs=0.3 * DEPTH)
+    (trace,) = list_traces(results)
+    assert trace.largest_opening == least and trace.mean_opening == pytest.approx(-np.pi / 4 * DEPTH, rel=1e-3)
+    assert collect_facts(results)["contact"]["crack"]["max_opening"] == least

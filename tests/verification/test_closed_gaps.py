@@ -184,3 +184,10 @@ def test_what_is_less_deep_is_told_of_other_bodies_than_before(monkeypatch: pyte
     told = [(note.split(":")[0], "sides" in note) for note in listener.notes]
     assert told == [("Step 1", False), ("Step 2", True), ("Step 3", True)]
     assert noted == {("a", "b"): 2.1, ("b", "b"): 0.1}
+
+
+def test_the_place_of_a_depth_is_told_without_rounding() -> None:
+    """As it would be another one on another number of ranks."""
+    told = [step_notes.describe_passing(Passing("one", "one", 0.25, complex(noise, -0.125), across=True))
+            for noise in (0.0, -3e-16, 4e-16)]
+    assert len(set(told)) == 1 and "at (0, -0.125)" in told[0]

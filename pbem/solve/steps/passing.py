@@ -14,6 +14,8 @@ from pbem.model.model import Model
 
 # Depths below this part of the largest displacement come from the outlines, which are polygons here.
 SLIGHT = 1e-2
+# Of a place that is told, this part of the depth.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,9 @@ def find_passing(model: Model, mesh: Mesh, displacement: Complex) -> Passing | N
 def describe_passing(found: Passing) -> str:
     """A sentence, and what to do."""
     where = f"{found.depth:.3g} deep"
-    place = f"({found.place.real:.6g}, {found.place.imag:.6g})"
+    # What is rounding beside the depth would differ from one number of ranks to the next.
+    at = [0.0 if abs(each) < ROUNDING * found.depth else each for each in (found.place.real, found.place.imag)]
+    place = f"({at[0]:.6g}, {at[1]:.6g})"
     if found.across:
         whose = f"'{found.first}'" if found.first == found.second else f"'{found.first}' and '{found.second}'"
         what = f"sides of {whose} lie {where} in each other at {place}, across what was a gap: "

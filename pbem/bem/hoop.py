@@ -16,6 +16,8 @@ from pbem.mesh.mesh import Mesh, second_face_nodes
 SMOOTH = 1e-6
 # Elements whose derivatives are formed at a time; of meshes of no more what these take is kept.
 AT_A_TIME = 1024
+# Faces whose stress is evaluated at a time.
+EVALUATED = 4096
 
 
 def evaluate_hoop_stress(
@@ -31,7 +33,6 @@ def evaluate_hoop_stress(
     1/sqrt(distance) in mode II, as it should; jumps keep to their own element. Elements of order 0 have no stretch of
     their own: there it is the difference between neighbours on the same curve, up to its corners.
     """
-    second = second_face_nodes(mesh)
     of_points = sample_points(mesh, initial)
     if of_points is not None:  # what is singular at a point is no polynomial
         rest = evaluate_hoop_stress(
@@ -39,26 +40,33 @@ def evaluate_hoop_stress(
             traction - of_points.traction,
         )
         return rest + of_points.hoop_stress
-    stretch, direction = evaluate_stretch(mesh, displacement)
-    region = np.concatenate([mesh.node_region, mesh.node_region[second]])
-    position = np.concatenate([mesh.position, mesh.position[second]])
-    normal = -1j * direction * np.where(np.arange(len(region)) < mesh.nodes, 1.0, -1.0)
-    strain = (np.conj(direction) * stretch).real
-    stress = np.empty(len(region))
+    stress = _measure_strain(mesh, displacement)
+    node = np.concatenate([np.arange(mesh.nodes), second_face_nodes(mesh)])
+    region = mesh.node_region[node]
     order = np.argsort(region, kind="stable")
     bounds = np.searchsorted(region[order], np.arange(len(initial) + 1))
     for number, particular in enumerate(initial):
-        own = order[bounds[number] : bounds[number + 1]]
-        n, e = normal[own], direction[own]
         at_rest = ParticularSolution(particular.material, initial=particular.initial)
-        rest_n = (np.conj(n) * at_rest.traction(position[own], n)).real
-        rest_s = (np.conj(e) * at_rest.traction(position[own], e)).real
-        elastic = strain[own] - particular.swelling.strain_along(position[own], e)
         kappa = particular.material.kappa
         lateral = (3 - kappa) / (1 + kappa)  # Poisson's ratio of the plane problem
-        pressed = (np.conj(n) * traction[own]).real - rest_n
-        stress[own] = rest_s + particular.material.plane_modulus * elastic + lateral * pressed
+        for begin in range(bounds[number], bounds[number + 1], EVALUATED):
+            own = order[begin : min(begin + EVALUATED, bounds[number + 1])]
+            position, e = mesh.position[node[own]], 1j * mesh.normal[node[own]]
+            n = -1j * e * np.where(own < mesh.nodes, 1.0, -1.0)
+            rest_n = (np.conj(n) * at_rest.traction(position, n)).real
+            rest_s = (np.conj(e) * at_rest.traction(position, e)).real
+            elastic = stress[own] - particular.swelling.strain_along(position, e)
+            pressed = (np.conj(n) * traction[own]).real - rest_n
+            stress[own] = rest_s + particular.material.plane_modulus * elastic + lateral * pressed
     return stress
+
+
+def _measure_strain(mesh: Mesh, displacement: Complex) -> Real:
+    """The stretch (f,) of all faces along themselves."""
+    mean, half_jump = differentiate_faces(mesh, displacement)
+    back = np.conj(1j * mesh.normal)
+    sides = back * (mean + half_jump), (back * (mean - half_jump))[second_face_nodes(mesh)]
+    return np.concatenate([each.real for each in sides])
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def evaluate_hoop_stress(
             traction - of_points.traction,
         )
         return rest + of_points.hoop_stress
-    stress = _measure_strain(mesh, displacement)
+    stress = np.concatenate([each.real for each in measure_gradients(mesh, displacement)])
     node = np.concatenate([np.arange(mesh.nodes), second_face_nodes(mesh)])
     region = mesh.node_region[node]
     order = np.argsort(region, kind="stable")
@@ -61,12 +61,12 @@ def evaluate_hoop_stress(
     return stress
 
 
-def _measure_strain(mesh: Mesh, displacement: Complex) -> Real:
-    """The stretch (f,) of all faces along themselves."""
+def measure_gradients(mesh: Mesh, displacement: Complex) -> tuple[Complex, Complex]:
+    """The stretch of faces along themselves, and by the imaginary part what they turn by (radians): of the nodes
+    (nodes,), and of the second faces of cracks behind these in `list_faces(mesh)`; displacement (f,)."""
     mean, half_jump = differentiate_faces(mesh, displacement)
     back = np.conj(1j * mesh.normal)
-    sides = back * (mean + half_jump), (back * (mean - half_jump))[second_face_nodes(mesh)]
-    return np.concatenate([each.real for each in sides])
+    return back * (mean + half_jump), (back * (mean - half_jump))[second_face_nodes(mesh)]
 
 
 @dataclass(frozen=True)

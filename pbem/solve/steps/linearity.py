@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.bem.hoop import differentiate_faces
+from pbem.bem.hoop import measure_gradients
 from pbem.geometry.tolerance import TIE
 from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.solve.problem.step import Linearity
@@ -21,7 +21,10 @@ EXCEEDED_ON = 0.01
 def measure_linearity(mesh: Mesh, displacement: Complex, slip: Real) -> Linearity:
     """Of the displacement (f,) at the nodes of `list_faces(mesh)` and the slip (m,) of all pairs."""
     # On every rank beside its matrices: no more at a time than has to be.
-    stretched, turned = _measure_gradients(mesh, displacement)
+    gradients = measure_gradients(mesh, displacement)
+    stretched = np.concatenate([np.abs(each.real) for each in gradients])
+    turned = np.concatenate([np.abs(each.imag) for each in gradients])
+    del gradients
     count, second = len(mesh.region_names), second_face_nodes(mesh)
     region = np.concatenate([mesh.node_region, mesh.node_region[second]])
     length = np.concatenate([mesh.weight, mesh.weight[second]])
@@ -34,15 +37,6 @@ def measure_linearity(mesh: Mesh, displacement: Complex, slip: Real) -> Linearit
     np.maximum.at(largest, pairs.interface, np.abs(slip))
     relative = np.divide(largest, length, out=np.zeros(interfaces), where=length > 0)
     return Linearity(strain, rotation, relative)
-
-
-def _measure_gradients(mesh: Mesh, displacement: Complex) -> tuple[Real, Real]:
-    """The sizes (f,) of the stretch of all faces along themselves, and of what they turn by."""
-    mean, half_jump = differentiate_faces(mesh, displacement)
-    back = np.conj(1j * mesh.normal)
-    sides = back * (mean + half_jump), (back * (mean - half_jump))[second_face_nodes(mesh)]
-    return (np.concatenate([np.abs(each.real) for each in sides]),
-            np.concatenate([np.abs(each.imag) for each in sides]))
 
 
 def _find_exceeded(values: Real, region: Integer, weight: Real, regions: int) -> Real:

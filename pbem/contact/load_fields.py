@@ -35,8 +35,9 @@ class NodeFields:
         self._taken: tuple[Integer, Complex] | None = None
 
     def without(self, gone: Bool) -> NodeFields:
-        """The same without what acts on regions that are gone (r,)."""
-        return NodeFields(self._mesh, self._balanced, self._remote, self._tools, gone)
+        """The same without what acts on regions that are gone (r,) besides."""
+        together = gone if self._gone is None else gone | self._gone
+        return NodeFields(self._mesh, self._balanced, self._remote, self._tools, together)
 
     def take_far(self, nodes: Integer) -> Complex:
         """Displacement and traction (2, k) of the remote field at nodes (k,), rising; not to be written to."""

@@ -334,13 +334,17 @@ class Model:
 
     @cached_property
     def self_energy_lengths(self) -> dict[str, float]:
-        """The same lengths as energies count, whatever the mesh is: of a region's loops, without its cracks if it has
-        loops, over pi. At this distance displacements of point loads, or of a net force on a plane, are zero."""
+        """The same lengths as energies count, whatever the mesh and the cracks are: of a region's loops over pi; of a
+        plane without loops the largest distance of two point loads, or, if there is no such, of the cracks over pi. At
+        this distance displacements of point loads, or of a net force on a plane, are zero."""
         lengths = {}
         for region in self.regions:
             if region.name in self.logarithm_lengths:
-                around = tuple(side.curve for loop in region.loops for side in loop.sides) or region.cracks
-                lengths[region.name] = sum(self.curves[name].length for name in around) / pi
+                around = tuple(side.curve for loop in region.loops for side in loop.sides)
+                places = [load.place for load in self.point_loads_by_region.get(region.name, ())]
+                apart = max((abs(a - b) for a in places for b in places), default=0.0)
+                of_curves = sum(self.curves[name].length for name in around or region.cracks) / pi
+                lengths[region.name] = of_curves if around or not apart else apart
         return lengths
 
     @property

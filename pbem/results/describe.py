@@ -17,6 +17,7 @@ from pbem.results.rigid import COMPONENTS, list_rigid_rows
 from pbem.results.text_tables import format_number as _number
 from pbem.results.text_tables import section as _section
 from pbem.results.text_tables import shorten as _shorten
+from pbem.results.text_tables import shorten_between as _shorten_between
 from pbem.results.text_tables import table as _table
 from pbem.results.tip_notes import doubt_factors, explain_missing_factors
 from pbem.results.trace_names import name_trace
@@ -66,7 +67,7 @@ def describe_results(results: Results, traces: int = 10) -> str:
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
         parts.append(_section("beyond linear theory at the last step", describe_linearity(results.linearity)))
         parts.append(_section("faces in each other at the last step", describe_pushed(find_pushed_faces(results))))
-        parts.append(_section("notes of the run", _shorten(results.notes, MOST_NOTES)))
+        parts.append(_section("notes of the run", _shorten_between(results.notes, MOST_NOTES)))
         parts.append(_section("estimated discretisation errors", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],

@@ -56,8 +56,10 @@ def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
 
 
 def find_long(model: Model, mesh: Mesh) -> list[str]:
-    """A sentence for each: cohesive faces whose elements are too long for the zone that softens, E' G/strength^2."""
-    length, told = np.abs(mesh.end - mesh.start)[mesh.pairs.slave // (mesh.order + 1)], []
+    """A sentence if elements of cohesive faces are too long for the zone that softens, E' G/strength^2; the worst
+    first."""
+    length = np.abs(mesh.end - mesh.start)[mesh.pairs.slave // (mesh.order + 1)]
+    found: list[tuple[float, float, float, str]] = []
     for name, part in zip(mesh.interface_names, _split(mesh), strict=True):
         law = find_joint(model, name).law
         if law.softening is None or not len(part):
@@ -72,11 +74,15 @@ def find_long(model: Model, mesh: Mesh) -> list[str]:
             zone = np.minimum(zone, np.where(value > 0, own, np.inf))
         worst = np.argmax(length[part] / zone)
         if length[part][worst] > zone[worst] / ZONE_ELEMENTS:
-            told.append(
-                f"{name}: elements of {length[part][worst]:.3g}, where the bonds soften over a zone of the length "
-                f"E' G/strength^2 = {zone[worst]:.3g}; with less than {ZONE_ELEMENTS} elements on it the strength that "
-                "is found depends on the mesh.")
-    return told
+            found.append((length[part][worst] / zone[worst], length[part][worst], zone[worst], name))
+    if not found:
+        return []
+    found.sort(key=lambda each: -each[0])
+    _, longest, zone_length, _ = found[0]
+    at_worst = ", at the worst" if len(found) > 1 else ""
+    return [f"{name_many([name for *_, name in found])}: elements of {longest:.3g}, where the bonds soften over a zone "
+            f"of the length E' G/strength^2 = {zone_length:.3g}{at_worst}; with less than {ZONE_ELEMENTS} elements on "
+            "it the strength that is found depends on the mesh."]
 
 
 def _split(mesh: Mesh) -> list[np.ndarray]:

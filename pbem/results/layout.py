@@ -40,6 +40,8 @@ TIP_DATASETS = ("KI", "KII", "J", "T")
 ENERGIES = ("external", "elastic", "dissipated", "released", "removed")
 # Set in the file of a finished pass after which another one may come.
 MAY_FOLLOW = "pass_may_follow"
+# Of /energy: the lengths up to which energies of point loads are left out, by region.
+SELF_ENERGY = "self_energy_lengths"
 CHUNK_BYTES = 32768
 
 
@@ -99,6 +101,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: Int
     _write_interfaces(file.create_group("contact"), together.create_group("contact"), model, mesh)
     _write_tips(file.create_group("tips"), together.create_group("tips"), model, mesh)
     energy = file.create_group("energy")
+    energy.attrs[SELF_ENERGY] = json.dumps(model.self_energy_lengths)
     for name in ENERGIES:
         create_energy(energy, name)
     create_balance(file, model, mesh)

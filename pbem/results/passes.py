@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+import h5py
 
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.accuracy import Pass
 from pbem.results.journal import lock
 from pbem.results.layout import MAY_FOLLOW, count_steps, read_fractions
-from pbem.results.notes import write_notes
+from pbem.results.notes import append_notes
 from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.store import Store, name_part
 from pbem.results.trial import check_contents
@@ -89,20 +90,20 @@ def expect_no_pass(path: Path, notes: Iterable[str] = ()) -> None:
     """Say in the file of a finished pass that no other one follows, with what was told of that. Raises ResultFileError.
     """
     try:
-        with change_attributes(path) as attributes:
-            attributes.pop(MAY_FOLLOW, None)
-            write_notes(attributes, notes)
+        with change_file(path) as file:
+            file.attrs.pop(MAY_FOLLOW, None)
+            append_notes(file, notes)
     except OSError as error:
         raise ResultFileError(str(path), f"cannot be written ({error.strerror or error})") from error
 
 
 @contextmanager
-def change_attributes(path: Path) -> Iterator[MutableMapping[str, Any]]:
-    """Those of a closed file, as the block leaves them; as they were if it raises. Raises ResultFileError, OSError."""
+def change_file(path: Path) -> Iterator[h5py.File]:
+    """A closed file, as the block leaves it; as it was if it raises. Raises ResultFileError, OSError."""
     with refuse_damage(path):
         storage = Store(path)
     try:
-        yield storage.file.attrs
+        yield storage.file
         storage.close()
     except BaseException:
         storage.drop()
@@ -134,10 +135,10 @@ class KeptPass:
     def restore(self, reasons: Mapping[str, str]) -> None:
         """Put it back in the place of the pass that failed, with the attributes that say why."""
         self._release()
-        with change_attributes(self._path) as attributes:
-            attributes.update(reasons)
+        with change_file(self._path) as file:
+            file.attrs.update(reasons)
             if not reasons:  # it is the last one
-                attributes.pop(MAY_FOLLOW, None)
+                file.attrs.pop(MAY_FOLLOW, None)
         self._path.replace(self._target)
 
     def drop(self) -> None:

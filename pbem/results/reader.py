@@ -335,7 +335,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         interior=read_interior(path, file, k),
         convergence=freeze(file["convergence"][...]),
         rigid=read_rigid(file, k),
-        notes=read_notes(attributes),
+        notes=read_notes(file),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from pbem.results.growing import extend
 from pbem.results.layout import (
     ENERGIES,
     MAY_FOLLOW,
+    SELF_ENERGY,
     SHOWN,
     TIP_DATASETS,
     count_steps,
@@ -64,12 +66,25 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     if mesh.pairs.count and not set(list_pair_datasets(model)) <= set(file["all/contact"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
+    if not _counts_alike(file, model):
+        raise ResultFileError(path, "was written by another version of pbem, which counted other energies of point "
+                                    "loads; run without resuming")
     position = to_columns(list_faces(mesh).position + model.origin)
     nodes = file["nodes/position"][...]
     same = SAME_PLACE * (model.size + abs(model.origin))
     if nodes.shape != position.shape or np.abs(nodes - position).max() > same:
         raise ResultFileError(path, "holds another mesh of this case (it was written by another version of pbem); "
                                     "run without resuming")
+
+
+def _counts_alike(file: h5py.File, model: Model) -> bool:
+    """Whether the energies of the file are those of `Model.self_energy_lengths`, where forces on points, or net forces
+    on a plane, make them count."""
+    counting = {region.name for region in model.regions if region.infinite and region.loops}
+    counting |= set(model.point_loads_by_region)
+    stored = json.loads(str(file["energy"].attrs.get(SELF_ENERGY, "{}")))
+    lengths = model.self_energy_lengths
+    return all(isclose(stored.get(name, 0.0), lengths[name], rel_tol=SAME_PLACE) for name in counting)
 
 
 def is_finished(path: Path, model: Model, mesh: Mesh) -> bool:

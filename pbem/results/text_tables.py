@@ -30,6 +30,14 @@ def shorten(texts: Sequence[str], most: int = MOST_ROWS) -> list[str]:
     return [*texts[:most], *([f"... and {len(texts) - most} more"] if len(texts) > most else [])]
 
 
+def shorten_between(texts: Sequence[str], most: int) -> list[str]:
+    """The first and the last texts, and how many there are between."""
+    if len(texts) <= most:
+        return list(texts)
+    first, last = most - most // 2, most // 2
+    return [*texts[:first], f"... {len(texts) - most} more ...", *texts[len(texts) - last :]]
+
+
 def _is_number(text: str) -> bool:
     try:
         float(text)

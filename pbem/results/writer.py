@@ -40,7 +40,7 @@ from pbem.results.layout import (
     write_header,
 )
 from pbem.results.linearity import append_linearity
-from pbem.results.notes import write_notes
+from pbem.results.notes import append_notes
 from pbem.results.opening import refuse_damage
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
@@ -200,8 +200,8 @@ class ResultWriter:
         return tuple(notes)
 
     def _commit(self, what: str) -> None:
-        write_notes(self._file.attrs, self.notes)
         try:
+            append_notes(self._file, self.notes)
             self._storage.commit()
         except OSError as error:
             raise StorageError(str(self.path), f"no room for {what} ({error.strerror or error})") from error
@@ -333,8 +333,10 @@ class ResultWriter:
         if not self._storage.is_open:
             return
         try:
+            last = self._pending is not None
             if self._pending is not None:
                 self._store(self._pending)
+            if append_notes(self._file, self.notes) or last:
                 self._storage.commit()
         except OSError as error:
             self._pending = None
@@ -342,7 +344,6 @@ class ResultWriter:
             if status == "finished":
                 self.fail("StorageError", str(error), "stopped")
                 raise StorageError(str(self.path), f"no room for the last step ({error.strerror or error})") from error
-        write_notes(self._file.attrs, self.notes)
         for name, value in {**reasons, "status": status}.items():
             self._file.attrs[name] = value
         self._storage.close()

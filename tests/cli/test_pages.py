@@ -198,4 +198,4 @@ def test_all_that_a_result_file_holds_is_explained(tmp_path: Path, monkeypatch: 
         group, _, _ = name.partition("/")
         dataset = name.rpartition("/")[2]
         text = sections[named.get(group, group)] + (sections["contact/NAME"] if group == "all" else "")
-        assert group in ("reactions", "convergence") or dataset == "reactions" or f"`{dataset}`" in text, name
+        assert group in ("reactions", "convergence", "notes") or dataset == "reactions" or f"`{dataset}`" in text, name

@@ -148,7 +148,6 @@ CURVES = (
 )  # fmt: skip
 
 
-
 def test_what_moves_on_quickly_leaves_room_to_follow_it_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond the largest push of 0.3: friction that weakens takes 19 problems with quick dashpots, 53 with slow ones.
     """

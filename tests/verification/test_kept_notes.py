@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 
 import pbem
@@ -15,7 +17,9 @@ from pbem import driver
 from pbem.errors import ConvergenceError
 from pbem.results.describe import describe_results
 from pbem.results.facts import collect_facts
+from pbem.results.notes import append_notes, read_notes
 from pbem.results.reader import Results
+from pbem.results.store import create_store
 from tests.verification.rigid_sample import UNMOVED, find_persson_force, write_pin
 from tests.verification.test_closed_gaps import write_slot
 from tests.verification.test_open_faces import SilentReporter
@@ -120,14 +124,39 @@ def test_notes_are_those_of_the_pass_that_is_stored(tmp_path: Path, monkeypatch:
     assert sum("The run on that mesh did not converge (mode cycle)" in note for note in stands.notes) == 1
 
 
+def test_many_notes_take_no_more_room_than_their_texts(tmp_path: Path) -> None:
+    """A step each, brought to the disk one by one: 300 of 150 characters are 45 kB."""
+    texts = [f"Step {number} is not a path of equilibria: " + "x" * 110 for number in range(300)]
+    storage = create_store(tmp_path / "notes.h5", False, lambda file: None)
+    for text in texts:
+        assert append_notes(storage.file, [text])
+        storage.commit()
+    assert not append_notes(storage.file, texts[:2])
+    storage.close()
+    assert (tmp_path / "notes.h5").stat().st_size < 2e5
+    with h5py.File(tmp_path / "notes.h5") as file:
+        assert read_notes(file) == tuple(texts)
+
+
+def test_of_many_notes_the_first_and_the_last_are_shown(tmp_path: Path) -> None:
+    results = pbem.run(write_case(tmp_path), tmp_path / "case.h5")
+    many = replace(results, notes=(*(f"of the model {k}" for k in range(30)), *results.notes))
+    text = describe_results(many)
+    assert "  of the model 0\n" in text and f"  {results.notes[-1]}\n" in f"{text}\n"
+    assert f"  ... {len(many.notes) - 20} more ...\n" in text
+
+
 def test_elements_too_long_for_bonds_that_soften_are_told_by_the_run(tmp_path: Path) -> None:
     listener = Noting()
     results = pbem.run({
         "materials": {"m": {"young": 1e3, "poisson": 0.25}},
-        "curves": {"crack": {"points": [[-1, 0], [1, 0]], "elements": 8}},
-        "regions": {"plane": {"material": "m", "infinite": True, "cracks": ["crack"]}},
-        "interfaces": {"crack": {"law": "cohesive", "tensile_strength": 1.0, "fracture_energy": 1e-4}},
+        "curves": {"crack": {"points": [[-1, 0], [1, 0]], "elements": 8},
+                   "longer": {"points": [[-2, 9], [2, 9]], "elements": 8}},
+        "regions": {"plane": {"material": "m", "infinite": True, "cracks": ["crack", "longer"]}},
+        "interfaces": {name: {"law": "cohesive", "tensile_strength": 1.0, "fracture_energy": 1e-4}
+                       for name in ("crack", "longer")},
         "remote": {"syy": 0.5}, "analysis": {"steps": 1},
     }, tmp_path / "bonds.h5", reporter=listener)  # fmt: skip
     told = [note for note in listener.notes if "E' G/strength^2 = 0.107" in note]
     assert len(told) == 1 and told[0] in results.notes
+    assert told[0].startswith("longer, crack: elements of 0.") and "at the worst" in told[0]

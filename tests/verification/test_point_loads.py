@@ -6,11 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
 import pbem
 from pbem.arrays import Complex, Real
+from pbem.errors import ResultFileError
 from pbem.results.reader import Results
 
 MATERIAL = {"young": 3e3, "poisson": 0.2}
@@ -293,6 +295,32 @@ def test_energies_of_a_load_do_not_depend_on_the_mesh_and_grow_by_j(
     short, middle, long = (solve_sheet(tmp_path, place, depth=depth) for depth in (0.98, 1.0, 1.02))
     grown = (long.energy.elastic[-1] - short.energy.elastic[-1]) / 0.04
     assert grown == pytest.approx(np.nanmax(middle.tips["crack"].J[-1]), rel=1e-2)
+
+
+def test_energies_of_two_loads_grow_by_j_with_a_crack_alone_in_a_plane(tmp_path: Path) -> None:
+    """There is no boundary, and what is left out must not follow the crack: both tips store J."""
+    def solve(half_length: float) -> Results:
+        return pbem.run({
+            "materials": {"m": MATERIAL},
+            "curves": {"crack": {"points": [[-half_length, 0], [half_length, 0]], "elements": 20}},
+            "regions": {"plane": {"material": "m", "infinite": True, "cracks": ["crack"]}},
+            "interfaces": {"crack": {"law": "open"}}, "analysis": {"steps": 1},
+            "point_loads": {"a": {"at": [0.2, 0.7], "fy": 1.0}, "b": {"at": [0.2, -0.7], "fy": -1.0}},
+        }, tmp_path / "plane.h5", force=True)  # fmt: skip
+
+    short, middle, long = (solve(half_length) for half_length in (0.98, 1.0, 1.02))
+    grown = (long.energy.elastic[-1] - short.energy.elastic[-1]) / 0.04
+    assert grown == pytest.approx(middle.tips["crack"].J[-1].sum(), rel=1e-2)
+
+
+def test_files_that_count_other_energies_are_not_gone_on_with(tmp_path: Path) -> None:
+    solve_sheet(tmp_path, (1.2, 0.7))
+    with h5py.File(tmp_path / "sheet.h5", "r+") as file:
+        text = str(file.attrs["case"])
+        del file["energy"].attrs["self_energy_lengths"]
+    (tmp_path / "sheet.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(ResultFileError, match="which counted other energies of point loads; run without resuming"):
+        pbem.run(tmp_path / "sheet.toml", tmp_path / "sheet.h5", resume=True)
 
 
 @pytest.mark.parametrize("kind", ["loads", "weight"])

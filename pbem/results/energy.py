@@ -33,6 +33,7 @@ import numpy as np
 from pbem.arrays import Complex, Real
 from pbem.contact.constraints import evaluate_fluid
 from pbem.contact.laws import PairLaws
+from pbem.geometry.tolerance import TIE
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.results.dissipation import PairWork, measure_work
@@ -163,7 +164,8 @@ class EnergyBalance:
             return None
         names = self._mesh.interface_names
         by_name = np.bincount(self._mesh.pairs.interface, pairs.surplus, minlength=len(names))
-        largest = np.argsort(-by_name, kind="stable")
+        # What symmetry makes equal is in the order of the interfaces: its rounding must not choose.
+        largest = np.argsort(-np.round(by_name / (TIE * released)), kind="stable")
         part = tuple(names[number] for number in largest if by_name[number] > LEAST_PART * released)
         return Runaway(released, released / at_hand, part)
 

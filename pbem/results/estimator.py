@@ -10,6 +10,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.errors import ConvergenceError, LawError
+from pbem.geometry.tolerance import TIE
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import BetweenNodes
@@ -84,8 +85,9 @@ class Estimator:
         estimates, relative = self.comparison.compare(step, second)
         parts = self.comparison.relate_violations(self._between.find_violations(step))
         for kind, values in vars(parts).items():
-            at = int(np.argmax(values)) if len(values) else -1
-            if at >= 0 and values[at] > self._worst[kind][0]:
+            # Of places and steps that symmetry makes equal the first: their rounding must not choose.
+            at = int(np.argmax(values >= (1 - TIE) * values.max())) if len(values) else -1
+            if at >= 0 and values[at] > (1 + TIE) * self._worst[kind][0]:
                 self._worst[kind] = (float(values[at]), self._names[at], step.number)
         return to_rows(estimates, relative, parts)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -46,10 +47,10 @@ for case in sys.argv[2:]:
 """
 
 
-def launch_all(folder: Path, ranks: int) -> Path:
-    """Run all models on so many ranks; returns the folder."""
+def launch_all(folder: Path, ranks: int, names: Sequence[str] = NAMES) -> Path:
+    """Run models on so many ranks; returns the folder."""
     cases = []
-    for name in NAMES:
+    for name in names:
         text = ONE_CRACK if name == "one crack" else TEXTS[name]()
         place = {"inclusions": 3.3, "cracks": 3.3, "infinite": 4.4, "one crack": 0.3}.get(name, 0.4)
         cases.append(folder / f"{name.replace(' ', '_')}.toml")
@@ -65,11 +66,11 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return launch_all(tmp_path_factory.mktemp("ranks_1"), 1)
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
-def test_ranks_do_not_change_the_results(ranks: int, alone: Path, tmp_path: Path) -> None:
-    launch_all(tmp_path, ranks)
-    paths = sorted(path.name for path in alone.glob("*.h5"))
-    assert len(paths) == len(NAMES)
+@pytest.mark.parametrize(("ranks", "names"), [(2, NAMES[::2]), (3, NAMES)])
+def test_ranks_do_not_change_the_results(ranks: int, names: Sequence[str], alone: Path, tmp_path: Path) -> None:
+    launch_all(tmp_path, ranks, names)
+    paths = sorted(path.name for path in tmp_path.glob("*.h5"))
+    assert len(paths) == len(names)
     faults = {
         name: differences
         for name in paths

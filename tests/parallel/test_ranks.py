@@ -114,7 +114,8 @@ def find_differences(one: dict[str, Array], other: dict[str, Array], rounding: f
 def test_ranks_do_not_change_the_results(
     ranks: int, folders: dict[int, Path], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    names = list(CASES)[:: ranks - 1]  # three and four processes take turns on fewer cores
+    # Each case on two or on three ranks; four processes take turns on fewer cores.
+    names = list(CASES)[{2: slice(0, None, 2), 3: slice(1, None, 2), 4: slice(0, None, 3)}[ranks]]
     folders[ranks] = launch_all(tmp_path_factory.mktemp(f"ranks_{ranks}"), ranks, names)
     faults = {
         name: differences

@@ -67,8 +67,8 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
     if mesh.pairs.count and not set(list_pair_datasets(model)) <= set(file["all/contact"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     if not _counts_alike(file, model):
-        raise ResultFileError(path, "was written by another version of pbem, which counted other energies of point loads "
-                                    "and of net forces on a plane; run without resuming")
+        raise ResultFileError(path, "was written by another version of pbem, which counted other energies of point "
+                                    "loads and of net forces on a plane; run without resuming")
     position = to_columns(list_faces(mesh).position + model.origin)
     nodes = file["nodes/position"][...]
     same = SAME_PLACE * (model.size + abs(model.origin))

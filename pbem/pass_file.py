@@ -16,6 +16,8 @@ from pbem.parallel import Comm, alone, do_on_first, lacks_memory
 from pbem.passes import Target, blame_pass
 from pbem.results.accuracy import Pass
 from pbem.results.passes import KeptPass, PassOutput, holds_steps, open_beside
+from pbem.results.tip_shape import Derived
+from pbem.results.tips import collect_tip_rules
 from pbem.results.writer import ResultWriter
 from pbem.solve.petsc.session import petsc_version
 
@@ -41,7 +43,11 @@ def write_pass(file: PassFile, comm: Comm, work: Callable[[ResultWriter | None],
     """Do something with the open file, which the first rank alone has; by all ranks together."""
     one = file.one
     with clock.piece("writing"):
+        # While the first rank writes what the file begins with the others derive what it needs with the first step.
+        derived = _derive_tip_forms(file, comm)
         output = do_on_first(comm, PbemError, lambda: _open(file, comm.size), share=False) or PassOutput()
+        for each in comm.gather(derived, root=0) or ():
+            expect_writer(output.writer).tip_rules.take(each)
     if output.writer:
         output.writer.notes = file.notes
     try:  # from here on whatever happens has to leave a closed file
@@ -59,6 +65,13 @@ def write_pass(file: PassFile, comm: Comm, work: Callable[[ResultWriter | None],
             output.former.drop()
         comm.Barrier()
     return found
+
+
+def _derive_tip_forms(file: PassFile, comm: Comm) -> Mapping[int, Derived]:
+    """On every rank but the first its share of the forms by which values at tips follow from a step, by number."""
+    if comm.rank == 0:
+        return {}
+    return collect_tip_rules(file.model, file.mesh).derive(slice(comm.rank - 1, None, comm.size - 1))
 
 
 def _open(file: PassFile, ranks: int) -> PassOutput:

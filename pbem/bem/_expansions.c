@@ -2,9 +2,11 @@
  * cluster, down the trees, to values at points. Only geometry is stored; pbem/bem/farfield.py calls them.
  *
  * series.h moves coefficients between clusters, ends.h makes them and evaluates them. The formulas are those of
- * pbem/pages/theory.md, section 6.
+ * pbem/pages/theory.md, section 6. tied_blocks.h has the products of what is near, combinations.h what near rows and the
+ * laws of pairs make of each other.
  */
 #include "buffers.h"
+#include "combinations.h"
 #include "ends.h"
 #include "tied_blocks.h"
 
@@ -249,6 +251,8 @@ static PyMethodDef methods[] = {
     {"carry", py_carry, METH_VARARGS, carry_doc},
     {"lower", py_lower, METH_VARARGS, lower_doc},
     {"evaluate", py_evaluate, METH_VARARGS, evaluate_doc},
+    {"add_combined", py_add_combined, METH_VARARGS, combined_doc},
+    {"combine_pairs", py_combine_pairs, METH_VARARGS, pairs_doc},
     {NULL, NULL, 0, NULL},
 };
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from pbem.arrays import Integer, Real
-from pbem.mesh.numbering import number_components
-
-Single = NDArray[np.float32]
+from pbem.arrays import Real
+from pbem.bem.combinations import Single, combine_pairs
 
 
 def solve_laws(
@@ -31,7 +28,9 @@ def solve_laws(
     wanted -= _multiply(law.tangent[:, :2], x)
     right = np.concatenate([_dot(law.across, wanted[one]), wanted[both, 0], wanted[both, 1]])
     if len(right) and np.abs(right).max() > least * np.abs(start[:, :2]).max():
-        _, _, change, zero_pivot = lapack.sgesv(law.form_matrix(stiffness), right.astype(np.float32), overwrite_a=True)
+        # The transposed matrix is factorised where it is.
+        factors, pivots, zero_pivot = lapack.sgetrf(law.form_matrix(stiffness).T, overwrite_a=True)
+        change = lapack.sgetrs(factors, pivots, right.astype(np.float32), trans=1, overwrite_b=True)[0]
         if zero_pivot or not np.isfinite(change).all():
             return None
         x[one, law.moving] += change[: len(one)]
@@ -79,14 +78,14 @@ class _Laws:
     def form_matrix(self, stiffness: Single) -> Single:
         """What the moving unknowns, those of `one` and the two of `both`, do to as many equations of tractions."""
         one, both, n, m = self.one, self.both, len(self.one), len(self.both)
-        rows = stiffness.take(number_components(np.concatenate([one, both])), axis=0)
-        block = np.concatenate([
-            _combine(rows, one, self.along), *(_combine(rows, both, self.tangent[both, 2:, j]) for j in range(2))
-        ], axis=1)  # fmt: skip
-        weight = self.across.astype(np.float32)
-        matrix = np.empty((n + 2 * m, n + 2 * m), dtype=np.float32, order="F")
-        matrix[:n] = -(weight[:, :1] * block[: 2 * n : 2] + weight[:, 1:] * block[1 : 2 * n : 2])
-        matrix[n : n + m], matrix[n + m :] = -block[2 * n :: 2], -block[2 * n + 1 :: 2]
+        pairs = 2 * np.concatenate([one, both, both])
+        entries = np.stack([pairs, pairs + 1], axis=1)  # n and s of each
+        weight, factor = np.zeros((2, n + 2 * m, 2))
+        weight[:n], factor[:n] = -self.across, self.along
+        for j in range(2):
+            part = slice(n + j * m, n + (j + 1) * m)
+            weight[part, j], factor[part] = -1.0, self.tangent[both, 2:, j]
+        matrix = combine_pairs(stiffness, entries, weight, entries, factor)
         own = np.arange(n)
         matrix[own, own] += _dot(self.across, self.tangent[one, :2, self.moving])
         own = n + np.arange(m)
@@ -94,15 +93,6 @@ class _Laws:
             for j in range(2):
                 matrix[own + i * m, own + j * m] += self.tangent[both, i, j]
         return matrix
-
-
-def _combine(rows: Single, pairs: Integer, along: Real) -> Single:
-    """The sum of the columns of n and s of some pairs (k,), each times its part of along (k, 2)."""
-    result = np.zeros((len(rows), len(pairs)), dtype=np.float32)
-    for i in range(2):
-        if along[:, i].any():
-            result += rows.take(2 * pairs + i, axis=1) * along[:, i].astype(np.float32)
-    return result
 
 
 def _respond(stiffness: Single, change: Real) -> Real:

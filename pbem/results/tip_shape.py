@@ -37,6 +37,9 @@ STRAIGHT = 1e-6
 # distance from the tip.
 BENT = 1e-2
 
+# What is derived of an arrangement: the intensity, and the other forms.
+Derived = tuple[Real, tuple[Real, Real, Complex, Real]]
+
 
 class TipForms:
     """The forms of one arrangement of elements, in units of E' and its length (K: E' times its root), each derived when
@@ -93,10 +96,14 @@ class TipForms:
             self._limited[most] = whole.fit_parallel_stress(most)
         return self._limited[most]
 
-    def derive(self) -> None:
-        """Derive all of them now, which takes less than one after the other."""
-        self._others  # noqa: B018
-        self.intensity  # noqa: B018
+    def derive(self) -> Derived:
+        """All of them, derived now, which takes less than one after the other; for `take` elsewhere."""
+        others = self._others  # first: the intensity may follow from the same field
+        return self.intensity, others
+
+    def take(self, derived: Derived) -> None:
+        """Take what was derived of the same arrangement elsewhere."""
+        vars(self)["intensity"], vars(self)["_others"] = derived
 
 
 def _is_whole_and_straight(shape: TipShape) -> bool:

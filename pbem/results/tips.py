@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 
@@ -21,7 +22,7 @@ from pbem.results.interface_release import InterfaceRelease, prepare_interface_r
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.tip_field import TipShape
 from pbem.results.tip_path import TipPaths, trace_paths, view_outward
-from pbem.results.tip_shape import STRAIGHT, TipForms
+from pbem.results.tip_shape import STRAIGHT, Derived, TipForms
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import ContactState, Step
 
@@ -71,10 +72,15 @@ class TipRules:
     groups: tuple[_Alike, ...]
     interfaces: InterfaceRelease
 
-    def derive(self) -> None:
-        """Derive the forms now, which else are derived when they are first asked for."""
-        for group in self.groups:
-            group.forms.derive()
+    def derive(self, part: slice = slice(None)) -> dict[int, Derived]:
+        """Derive the forms of some of the groups now, which else are derived when they are first asked for; by number.
+        """
+        return {number: self.groups[number].forms.derive() for number in range(len(self.groups))[part]}
+
+    def take(self, derived: Mapping[int, Derived]) -> None:
+        """Take the forms of groups that were derived elsewhere, for the same model and mesh."""
+        for number, forms in derived.items():
+            self.groups[number].forms.take(forms)
 
     def evaluate(self, contact: ContactState) -> dict[str, tuple[Real, Real]]:
         """KI and KII (2,) of every crack at its start and its end, as in `evaluate_factors`."""

@@ -152,7 +152,6 @@ class ResultWriter:
         self._every = max(1, model.output_every)
         self._pairs = join_pairs(sort_pairs(mesh))
         self.tip_rules = collect_tip_rules(model, mesh)
-        self.tip_rules.derive()
         self._balance = EnergyBalance(model, mesh, last_step, reached)
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
         self._absence = Absence(model, mesh, points)

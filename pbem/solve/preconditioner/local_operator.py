@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.combinations import Combination, make_combination
 from pbem.bem.operator import CHUNK_BYTES, collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.bem.rigid_region import form_rigid_rows
@@ -24,6 +26,15 @@ from pbem.solve.preconditioner.near_map import NearMap
 NODES_AT_ONCE = 64
 # Anchors that act by no more than this part do not act.
 NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Elements of a region that are seen, rising, and what the constraint map makes of the entries of v there."""
+
+    region: int
+    seen: Integer
+    combination: Combination
 
 
 class LocalOperator:
@@ -61,66 +72,66 @@ class LocalOperator:
         columns = around[left]
         if not len(columns):  # where all pairs stick nothing is left
             return np.zeros((len(rows), 0))
-        column, row, value = take_entries(near.columns, near.find(columns))
         node = around[rows] // 2
         assert (np.diff(rows) > 0).all() and (np.diff(left) > 0).all()
         nodes, result = np.unique(node), np.empty((len(rows), len(left)))
+        parts = self._list_parts(elements, columns, near)
         # The rows of a rigid body are made all at once.
-        rigid = any(self._materials[region].rigid is not None for region in np.unique(self._mesh.region[elements]))
+        rigid = any(self._materials[part.region].rigid is not None for part in parts)
         step = max(1, len(nodes)) if rigid else NODES_AT_ONCE
         for begin in range(0, len(nodes), step):
             some = nodes[begin : begin + step]
-            formed = self._form_nodes(elements, some, columns, (row, column, value), near)
+            formed = self._form_nodes(some, columns, parts, near)
             if less is not None:
                 formed = (less.turn[near.find_nodes(some)] @ formed.reshape(len(some), 2, -1)).reshape(formed.shape)
             own = slice(*np.searchsorted(node, [some[0], some[-1] + 1]))
-            result[own] = formed[np.searchsorted(number_components(some), around[rows[own]])]
+            if own.stop - own.start < len(formed):
+                formed = formed[np.searchsorted(number_components(some), around[rows[own]])]
+            result[own] = formed
         return result
 
-    def _form_nodes(
-        self, elements: Integer, nodes: Integer, columns: Integer, entries: tuple[Integer, Integer, Real],
-        near: NearMap,
-    ) -> Real:
-        """Rows of the tangent operator of some nodes (k,), rising, on some of its columns: (2 k, columns).
+    def _list_parts(self, elements: Integer, columns: Integer, near: NearMap) -> list[_Part]:
+        """What the unknowns `columns` (k,), rising, of elements move, region by region of the elements.
 
-        entries: of the constraint map in these columns, see `_add_products`.
+        They also move nodes beyond, where the other side of a pair is in none of these groups.
         """
-        mesh = self._mesh
+        column, row, value = take_entries(near.columns, near.find(columns))
+        sources = np.unique(row // 2 % self._mesh.nodes // self._per_element)
+        parts = []
+        for region in np.unique(self._mesh.region[elements]):
+            seen = sources[self._mesh.region[sources] == region]
+            if len(seen):
+                place, known = find_places(self._list_entries(int(region), seen), row)
+                combination = make_combination(len(columns), column[known], place[known], value[known])
+                parts.append(_Part(int(region), seen, combination))
+        return parts
+
+    def _form_nodes(self, nodes: Integer, columns: Integer, parts: Sequence[_Part], near: NearMap) -> Real:
+        """Rows of the tangent operator of some nodes (k,), rising, on some of its columns: (2 k, columns)."""
         formed = np.zeros((2 * len(nodes), len(columns)))
         row, column, value = take_entries(near.free, near.find(number_components(nodes)))
         place, known = find_places(columns, column)
         formed[row[known], place[known]] = value[known]
-        # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
-        sources = np.unique(entries[0] // 2 % mesh.nodes // self._per_element)
-        for region in np.unique(mesh.region[elements]):
-            own = np.flatnonzero(mesh.region[nodes // self._per_element] == region)
-            seen = sources[mesh.region[sources] == region]
-            if len(own) and len(seen):
-                self._add_products(formed, int(region), seen, nodes, own, entries)
+        region = self._mesh.region[nodes // self._per_element]
+        for part in parts:
+            own = np.flatnonzero(region == part.region)
+            if len(own):
+                self._add_products(formed, part, nodes, own)
         return formed
 
-    def _add_products(
-        self, formed: Real, region: int, seen: Integer, nodes: Integer, own: Integer,
-        constraints: tuple[Integer, Integer, Real],
-    ) -> None:
-        """Add to the rows of nodes[own] of a region what elements seen do, as the constraint map's entries combine it.
+    def _add_products(self, formed: Real, part: _Part, nodes: Integer, own: Integer) -> None:
+        """Add to the rows of nodes[own] of a region what its elements do, as the constraint map combines it.
 
-        formed (2 nodes, columns); constraints: entry of v, column, and value of each entry. Some rows at a time: all
-        entries of B of a large group would take several times what is formed of them.
+        formed (2 nodes, columns). Some rows at a time: all entries of B of a large group would take several times what
+        is formed of them.
         """
-        row, column, value = constraints
-        step = max(1, CHUNK_BYTES // (8 * 2 * 4 * (self._mesh.order + 1) * len(seen)))
-        if self._materials[region].rigid is not None:
+        step = max(1, CHUNK_BYTES // (8 * 2 * 4 * (self._mesh.order + 1) * len(part.seen)))
+        if self._materials[part.region].rigid is not None:
             step = len(own)
-        chosen = None
         for begin in range(0, len(own), step):
-            part = own[begin : begin + step]
-            values, places = self.evaluate(region, seen, nodes[part])
-            if chosen is None:
-                place, known = find_places(places, row)
-                entries = (value[known], (column[known], place[known]))
-                chosen = sparse.csr_matrix(entries, shape=(formed.shape[1], len(places)))
-            formed[number_components(part)] += (chosen @ values.T).T
+            some = own[begin : begin + step]
+            values, _ = self.evaluate(part.region, part.seen, nodes[some])
+            part.combination.add(values, number_components(some), formed)
 
     def evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
         """Rows of B of nodes, less the free terms, on the entries of v of elements of the same region; and these."""
@@ -130,29 +141,13 @@ class LocalOperator:
     def evaluate_unheld(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
         """The same without what the region's anchors add."""
         mesh = self._mesh
-        sources: Sources = self._sources[region].select(elements - self._first_element[region])
-        bounded = bool((sources.family == 0).any())
-        place, there = find_places(elements, nodes // self._per_element)
-        on = np.where(there, place, -1)
-        seen = list_nodes(mesh, elements)
-        columns = number_components(seen)
-        if bounded:
-            columns = np.concatenate([columns, 2 * mesh.nodes + columns])
-        material = self._materials[region]
+        columns, material = self._list_entries(region, elements), self._materials[region]
         if material.rigid is not None:
-            whole = form_rigid_rows(mesh, region, material)
+            whole, seen = form_rigid_rows(mesh, region, material), list_nodes(mesh, elements)
             first, count = self._first_element[region] * (mesh.order + 1), whole.shape[1] // 2
             at = np.concatenate([number_components(seen - first), count + number_components(seen - first)])
             return whole[np.ix_(number_components(nodes - first), at)], columns
-        local = mesh.take_local(nodes)
-        values = np.empty((2 * len(nodes), len(columns)))
-        for traction in (False, True):
-            at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
-            if len(at):
-                own = nodes[at]
-                normal = mesh.normal[own] if traction else None
-                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, local[at])
-                values[number_components(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
+        values = self._evaluate_rows(region, elements, nodes)
         values *= -np.repeat(self._scale(nodes), 2)[:, None]
         for motions in self._rigid:
             place, there = find_places(columns, motions.columns)
@@ -162,6 +157,34 @@ class LocalOperator:
                 left = (self.collect_free(nodes) @ rotation) + values @ rotation[columns]
                 values[:, place] -= np.outer(left, motions.basis[-1])
         return values, columns
+
+    def _list_entries(self, region: int, elements: Integer) -> Integer:
+        """The entries of v that elements of a region act by, in the order of `evaluate`."""
+        columns = number_components(list_nodes(self._mesh, elements))
+        bounded = (self._sources[region].family[elements - self._first_element[region]] == 0).any()
+        return np.concatenate([columns, 2 * self._mesh.nodes + columns]) if bounded else columns
+
+    def _evaluate_rows(self, region: int, elements: Integer, nodes: Integer) -> Real:
+        """The kernels' rows of nodes, each with its own kind of equation, as `evaluate_unheld` scales them."""
+        mesh = self._mesh
+        sources: Sources = self._sources[region].select(elements - self._first_element[region])
+        bounded = bool((sources.family == 0).any())
+        place, there = find_places(elements, nodes // self._per_element)
+        on, local, is_traction = np.where(there, place, -1), mesh.take_local(nodes), mesh.traction_equation[nodes]
+        found: list[tuple[Integer, Real]] = []
+        for traction in (False, True):
+            at = np.flatnonzero(is_traction == traction)
+            if len(at):
+                own = nodes[at]
+                normal = mesh.normal[own] if traction else None
+                first, second = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, local[at])
+                found.append((at, first if second is None else np.concatenate([first, second], axis=1)))
+        if len(found) == 1:
+            return found[0][1]
+        values = np.empty((2 * len(nodes), found[0][1].shape[1]))
+        for at, part in found:
+            values[number_components(at)] = part
+        return values
 
     def hold(self, values: Real, nodes: Integer, seen: Integer, region: int) -> Real:
         """Rows of nodes on the displacements of others, with what the region's anchors add; values stays as it is."""

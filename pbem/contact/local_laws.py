@@ -2,42 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import lapack
 
-from pbem.arrays import Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.bem.combinations import Single, combine_pairs
 
 
 def solve_laws(
-    tangent: Real, offset: Real, stiffness: Single, start: Real, scale: float, least: float = 0.0
-) -> Real | None:
-    """Values (k, 4) that fulfil linear laws and p = p_0 + stiffness (g - g_0); None if there are none.
+    tangent: Real, offset: Real, first: Integer, stiffness: Sequence[Single], start: Real, scale: float,
+    least: float = 0.0,
+) -> tuple[Real, Bool]:
+    """Values (k, 4) of the pairs of g groups that fulfil linear laws and p = p_0 + stiffness (g - g_0), and for which
+    groups (g,) there are some; of the others the values stay.
 
     tangent (k, 4, 2), offset (k, 4): of the laws (see pbem.contact.modes.Linearisation), with tractions `scale` times
-    those of the values. stiffness (2 k, 2 k): n and s of pair after pair. start (k, 4): p_0 and g_0. What changes is
-    solved for in single precision. Where the jumps fulfil the laws, and the tractions but for `least` times the largest
-    one, the jumps stay as they are.
+    those of the values. Group j has the pairs from first[j] to first[j + 1], and stiffness[j] (2 n, 2 n): n and s of
+    pair after pair. start (k, 4): p_0 and g_0. What changes is solved for in single precision. Where the jumps fulfil
+    the laws, and the tractions but for `least` times the group's largest one, the jumps stay as they are.
     """
     units = np.array([scale, scale, 1.0, 1.0])
     law = _Laws(tangent / units[:, None], offset / units)
-    one, both = law.one, law.both
     x = law.fit_jumps(start[:, 2:])
-    jumps = law.offset[:, 2:] + _multiply(law.tangent[:, 2:], x)
-    wanted = start[:, :2] + _respond(stiffness, jumps - start[:, 2:]) - law.offset[:, :2]
-    wanted -= _multiply(law.tangent[:, :2], x)
-    right = np.concatenate([_dot(law.across, wanted[one]), wanted[both, 0], wanted[both, 1]])
-    if len(right) and np.abs(right).max() > least * np.abs(start[:, :2]).max():
-        # The transposed matrix is factorised where it is.
-        factors, pivots, zero_pivot = lapack.sgetrf(law.form_matrix(stiffness).T, overwrite_a=True)
-        change = lapack.sgetrs(factors, pivots, right.astype(np.float32), trans=1, overwrite_b=True)[0]
-        if zero_pivot or not np.isfinite(change).all():
-            return None
-        x[one, law.moving] += change[: len(one)]
-        x[both] += change[len(one) :].reshape(2, -1).T
-        jumps = law.offset[:, 2:] + _multiply(law.tangent[:, 2:], x)
-    traction = start[:, :2] + _respond(stiffness, jumps - start[:, 2:])
-    return np.concatenate([law.offset[:, :2] + law.follow_tractions(traction, x), jumps], axis=1)
+    jumps = law.jump(x)
+    response = np.zeros_like(jumps)
+    groups = [slice(*first[j : j + 2]) for j in range(len(stiffness))]
+    for own, each in zip(groups, stiffness, strict=True):
+        response[own] = _respond(each, (jumps - start[:, 2:])[own])
+    wanted = start[:, :2] + response - law.offset[:, :2] - _multiply(law.tangent[:, :2], x)
+    parts = [law.take(own) for own in groups]
+    found = np.array([part.solve(each, wanted, least * np.abs(start[own, :2]).max(initial=0.0), x)
+                      for own, each, part in zip(groups, stiffness, parts, strict=True)], dtype=np.int8)
+    jumps = law.jump(x)
+    for j in np.flatnonzero(found == CHANGED):
+        response[groups[j]] = _respond(stiffness[j], (jumps - start[:, 2:])[groups[j]])
+    traction = law.offset[:, :2] + law.follow_tractions(start[:, :2] + response, x)
+    solved = found != NONE
+    kept = np.repeat(solved, np.diff(first))[:, None]
+    return np.where(kept, np.concatenate([traction, jumps], axis=1), start), solved
+
+
+# What the solution for a group came to.
+NONE, AS_IT_IS, CHANGED = range(3)
 
 
 class _Laws:
@@ -75,23 +84,67 @@ class _Laws:
         x[self.one, self.resting] = _dot(self.still, left[self.one]) / _dot(self.still, self.still)
         return _multiply(self.tangent[:, :2], x)
 
-    def form_matrix(self, stiffness: Single) -> Single:
+    def jump(self, x: Real) -> Real:
+        """Jumps (k, 2) of the unknowns x (k, 2)."""
+        return np.asarray(self.offset[:, 2:] + _multiply(self.tangent[:, 2:], x))
+
+    def take(self, pairs: slice) -> _Group:
+        """The laws of the pairs of one group."""
+        one, both = (slice(*np.searchsorted(each, [pairs.start, pairs.stop])) for each in (self.one, self.both))
+        chosen, full = self.one[one], self.both[both]
+        own = _dot(self.across[one], self.tangent[chosen, :2, self.moving[one]])
+        return _Group(pairs.start, chosen, full, self.moving[one], self.across[one], self.along[one], own,
+                      self.tangent[full])
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Of `_Laws` those of the pairs of a group, whose first pair is begin. one, both: their numbers among all pairs;
+    own (n,): what the moving unknowns of `one` do in their own pairs' equations; full (m, 4, 2): the laws of `both`.
+    """
+
+    begin: int
+    one: Integer
+    both: Integer
+    moving: Integer
+    across: Real
+    along: Real
+    own: Real
+    full: Real
+
+    def solve(self, stiffness: Single, wanted: Real, least: float, x: Real) -> int:
+        """Put into x (k, 2) of all pairs what this group's moving unknowns are, where its equations are off by more
+        than least; what that came to. wanted (k, 2): tractions that are left over."""
+        one, both = self.one, self.both
+        right = np.concatenate([_dot(self.across, wanted[one]), wanted[both, 0], wanted[both, 1]])
+        if not (len(right) and np.abs(right).max() > least):
+            return AS_IT_IS
+        # The transposed matrix is factorised where it is.
+        factors, pivots, zero_pivot = lapack.sgetrf(self._form_matrix(stiffness).T, overwrite_a=True)
+        change = lapack.sgetrs(factors, pivots, right.astype(np.float32), trans=1, overwrite_b=True)[0]
+        if zero_pivot or not np.isfinite(change).all():
+            return NONE
+        x[one, self.moving] += change[: len(one)]
+        x[both] += change[len(one) :].reshape(2, -1).T
+        return CHANGED
+
+    def _form_matrix(self, stiffness: Single) -> Single:
         """What the moving unknowns, those of `one` and the two of `both`, do to as many equations of tractions."""
-        one, both, n, m = self.one, self.both, len(self.one), len(self.both)
-        pairs = 2 * np.concatenate([one, both, both])
+        n, m = len(self.one), len(self.both)
+        pairs = 2 * (np.concatenate([self.one, self.both, self.both]) - self.begin)
         entries = np.stack([pairs, pairs + 1], axis=1)  # n and s of each
         weight, factor = np.zeros((2, n + 2 * m, 2))
         weight[:n], factor[:n] = -self.across, self.along
         for j in range(2):
             part = slice(n + j * m, n + (j + 1) * m)
-            weight[part, j], factor[part] = -1.0, self.tangent[both, 2:, j]
+            weight[part, j], factor[part] = -1.0, self.full[:, 2:, j]
         matrix = combine_pairs(stiffness, entries, weight, entries, factor)
-        own = np.arange(n)
-        matrix[own, own] += _dot(self.across, self.tangent[one, :2, self.moving])
-        own = n + np.arange(m)
+        at = np.arange(n)
+        matrix[at, at] += self.own
+        at = n + np.arange(m)
         for i in range(2):
             for j in range(2):
-                matrix[own + i * m, own + j * m] += self.tangent[both, i, j]
+                matrix[at + i * m, at + j * m] += self.full[:, i, j]
         return matrix
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from pbem.case.build import parse_model
 from pbem.contact.constraints import evaluate_pairs
@@ -63,7 +64,18 @@ def test_values_fulfil_the_laws_and_follow_the_stiffness() -> None:
     root = random.normal(size=(2 * count, 2 * count))
     stiffness = (-(root @ root.T) - np.eye(2 * count)).astype(np.float32)
     start = random.normal(size=(count, 4))
-    found = solve_laws(law.tangent, law.offset, stiffness, start, scale)
+    # Three groups, of which the last one has no solution.
+    none = np.zeros((6, 6), dtype=np.float32)
+    sizes, first = [(0, 20), (20, count)], np.array([0, 20, count, count + 3])
+    stiffnesses = [np.ascontiguousarray(stiffness[2 * low : 2 * high, 2 * low : 2 * high]) for low, high in sizes]
+    stiffness = block_diag(*stiffnesses).astype(np.float32)
+    free = np.repeat(np.array([[[0, 0], [0, 0], [1, 0], [0, 1.0]]]), 3, axis=0)
+    tangent = np.concatenate([law.tangent, free])
+    offset, begin = np.concatenate([law.offset, np.zeros((3, 4))]), np.concatenate([start, np.ones((3, 4))])
+    values, solved = solve_laws(tangent, offset, first, [*stiffnesses, none], begin, scale)
+    assert solved.tolist() == [True, True, False]
+    assert np.array_equal(values[count:], begin[count:])
+    found = values[:count]
     follows = start[:, :2] + (stiffness @ (found[:, 2:] - start[:, 2:]).ravel()).reshape(count, 2)
     np.testing.assert_allclose(found[:, :2], follows, rtol=0, atol=1e-3 * np.abs(found[:, :2]).max())
     # What is left of the states has nothing but what the modes leave free.
@@ -76,7 +88,30 @@ def test_values_fulfil_the_laws_and_follow_the_stiffness() -> None:
 def test_laws_without_a_solution_have_none() -> None:
     laws, modes = make_laws(2, np.zeros(2), np.zeros(2)), ModeState(np.full(2, OPEN, dtype=np.int8), np.ones(2))
     law = linearise(laws, modes, np.zeros(2), np.zeros(2), remember(0.0, 2), np.zeros(2), 1.0)
-    assert solve_laws(law.tangent, law.offset, np.zeros((4, 4), dtype=np.float32), np.ones((2, 4)), 1.0) is None
+    none = [np.zeros((4, 4), dtype=np.float32)]
+    values, solved = solve_laws(law.tangent, law.offset, np.array([0, 2]), none, np.ones((2, 4)), 1.0)
+    assert not solved.any() and np.array_equal(values, np.ones((2, 4)))
+
+
+def test_groups_that_fulfil_their_laws_stay_and_do_not_depend_on_others() -> None:
+    """Ranks share the groups between them; what is off by less than asked keeps its jumps."""
+    random, count = np.random.default_rng(6), 12
+    laws = make_laws(count, np.full(count, 0.5), np.zeros(count))
+    modes = ModeState((np.arange(count) % 3).astype(np.int8), np.ones(count))
+    law = linearise(laws, modes, np.full(count, -1.0), np.zeros(count), remember(0.1, count), np.zeros(count), 1.0)
+    first, stiffness = np.array([0, 5, 12]), []
+    for pairs in (5, 7):
+        root = random.normal(size=(2 * pairs, 2 * pairs))
+        stiffness.append((-(root @ root.T) - np.eye(2 * pairs)).astype(np.float32))
+    start = random.normal(size=(count, 4))
+    whole, _ = solve_laws(law.tangent, law.offset, first, stiffness, start, 1.0)
+    for j, own in enumerate([slice(0, 5), slice(5, 12)]):
+        alone, _ = solve_laws(law.tangent[own], law.offset[own], np.array([0, own.stop - own.start]), [stiffness[j]],
+                              start[own], 1.0)
+        assert np.array_equal(alone, whole[own])
+    again, solved = solve_laws(law.tangent, law.offset, first, stiffness, whole, 1.0, least=1e-3)
+    assert solved.all()
+    np.testing.assert_allclose(again[:, 2:], whole[:, 2:], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("law", ["friction = 0.4", f"friction = 0.4, {SOFT}"])

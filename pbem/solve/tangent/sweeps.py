@@ -159,16 +159,12 @@ class Sweeps:
     def _solve_groups(self, part: Subset, groups: Integer, first: Integer, values: Real, least: float) -> Real:
         """The values of the pairs of some groups in their modes; as they were where there are none. least: what counts.
         """
-        scale, result, stiffness = self._problem.traction_scale, values.copy(), self.parts.stiffness
+        scale = self._problem.traction_scale
         state = _name_state(values, scale)
         slip = plastic_slip(part.laws, state)
         law = linearise(part.laws, part.modes, state.p_n, slip, part.memory, part.pressure, scale)
-        for k, group in enumerate(groups):
-            own = slice(first[k], first[k + 1])
-            found = solve_laws(law.tangent[own], law.offset[own], stiffness[group], values[own], scale, least)
-            if found is not None:
-                result[own] = found
-        return result
+        stiffness = [self.parts.stiffness[group] for group in groups]
+        return solve_laws(law.tangent, law.offset, first, stiffness, values, scale, least)[0]
 
     def find_tractions(self, load: Load, solved: Solved, jumps: Real) -> Real:
         """Tractions (m, 2) of all pairs, in units of the traction scale, from their jumps (m, 2); all ranks together.

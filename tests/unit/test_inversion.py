@@ -42,6 +42,37 @@ def test_some_rows_are_those_of_the_whole() -> None:
     np.testing.assert_allclose(some, wanted @ whole, rtol=0, atol=1e-13)
 
 
+def test_single_precision_serves_whatever_the_units() -> None:
+    """Rows and columns of many units, as those of tractions and jumps are."""
+    matrix, random = draw_matrix(260, 0), np.random.default_rng(3)
+    rows, columns = 10.0 ** random.integers(-16, 16, size=(2, 260))
+    wanted = random.normal(size=(30, 260))
+    exact = wanted @ np.linalg.inv(matrix)
+    found, directions = invert_rows(
+        np.ascontiguousarray(rows[:, None] * matrix * columns), wanted * columns, matrix.copy, single=True)
+    assert found is not None and found.dtype == np.float32 and directions == 0
+    np.testing.assert_allclose(found * rows, exact, rtol=0, atol=1e-4 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(("singular", "least"), [(0, 1e-6), (3, 0.1)])
+def test_what_single_precision_cannot_invert_is_inverted_in_double(singular: int, least: float) -> None:
+    matrix = draw_matrix(220, singular)
+    if not singular:
+        left, values, right = np.linalg.svd(matrix)
+        values[-1] = least
+        matrix = np.ascontiguousarray((left * values) @ right)
+    found, directions = invert_rows(matrix.copy(), np.eye(220), matrix.copy, single=True)
+    assert found is not None and found.dtype == np.float64 and directions == singular
+    np.testing.assert_allclose(matrix @ found @ matrix, matrix, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
+def test_large_matrices_without_an_inverse(value: float, single: bool) -> None:
+    matrix = np.full((230, 230), value)
+    assert invert_rows(matrix.copy(), np.eye(230), matrix.copy, single)[0] is None
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
 def test_what_has_no_inverse_at_all(value: float) -> None:
     matrix = np.full((4, 4), value)

@@ -21,13 +21,25 @@ SINGULAR = 1e-13
 DIRECTIONS, MOST_ROUNDS = 12, 3
 # Rows that are summed at a time.
 SUMMED = 64
+# Single precision serves a preconditioner where the condition of the scaled matrix is at most the inverse of this; its
+# factors save time from so many rows on.
+WELL_CONDITIONED = 1e-4
+LARGE = 200
+
+Single = NDArray[np.float32]
 
 
-def invert_rows(matrix: Real, wanted: Real, form: Callable[[], Real]) -> tuple[Real | None, int]:
+def invert_rows(
+    matrix: Real, wanted: Real, form: Callable[[], Real], single: bool = False
+) -> tuple[Real | Single | None, int]:
     """wanted (k, n) times the inverse of the matrix (n, n), and in how many directions that is singular.
 
-    matrix: in C order; it is overwritten. form: makes it once more where it is singular. None where that does not help.
+    matrix: in C order; it is overwritten. form: makes it once more where it is singular. single: in single precision
+    where that is enough. None where nothing helps.
     """
+    rows = _invert_in_single(matrix, wanted) if single and len(matrix) >= LARGE else None
+    if rows is not None:
+        return rows, 0
     size, found = _find_norm(matrix), 0
     left, right = np.zeros((len(matrix), 0)), np.zeros((len(matrix), 0))
     for left_over in reversed(range(MOST_ROUNDS if size else 0)):
@@ -43,6 +55,36 @@ def invert_rows(matrix: Real, wanted: Real, form: Callable[[], Real]) -> tuple[R
         matrix = form()
         matrix += size * (right @ left.T)
     return None, found
+
+
+def _invert_in_single(matrix: Real, wanted: Real) -> Single | None:
+    """wanted times the inverse of the matrix; None where that is not as good as a preconditioner has to be, or leaves
+    the range of single precision.
+
+    Rows and columns are scaled by powers of two first, as their units are many.
+    """
+    parts = [slice(begin, begin + SUMMED) for begin in range(0, len(matrix), SUMMED)]
+    with np.errstate(over="ignore", invalid="ignore"):
+        row = _find_powers(np.concatenate([np.abs(matrix[part]).max(axis=1) for part in parts]))
+        largest = [(np.abs(matrix[part]) / row[part, None]).max(axis=0) for part in parts]
+        column = _find_powers(np.max(largest, axis=0))
+        scaled = np.empty(matrix.shape, dtype=np.float32)
+        for part in parts:
+            scaled[part] = matrix[part] / row[part, None] / column
+        size = max(float(np.abs(scaled[part]).sum(axis=1).max()) for part in parts)
+        if not np.isfinite(size):
+            return None
+        factors, pivots, _ = lapack.sgetrf(scaled.T, overwrite_a=True)
+        if not lapack.sgecon(factors, size)[0] > WELL_CONDITIONED:
+            return None
+        found = lapack.sgetrs(factors, pivots, (wanted / column).astype(np.float32).T, overwrite_b=True)[0].T
+        result: Single = (found / row).astype(np.float32)
+    return result if np.isfinite(result).all() else None
+
+
+def _find_powers(size: Real) -> Real:
+    """The powers of two next above sizes; 1 for what is zero or no number."""
+    return np.asarray(np.ldexp(1.0, np.where(np.isfinite(size), np.frexp(size)[1], 0)))
 
 
 def _find_norm(matrix: Real) -> float:

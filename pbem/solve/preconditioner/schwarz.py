@@ -250,13 +250,14 @@ class SchwarzPreconditioner:
         wanted[np.searchsorted(inverse.solved, kept), np.searchsorted(left, inside[kept])] = 1.0
         if not rest.all():
             whole = whole[rest]
+        # All groups together are much of what is stored: of large models in single precision.
+        single = len(around) < 2 * self._mesh.nodes >= SINGLE
         matrix, found = invert_rows(
-            whole, wanted, lambda: self._local.form(elements, around, rows[rest], left, near, less)
+            whole, wanted, lambda: self._local.form(elements, around, rows[rest], left, near, less), single
         )
         if matrix is not None:
-            # All groups together are much of what is stored: of large models in single precision.
-            stored: Real | Single = np.ascontiguousarray(matrix)
-            if len(around) < 2 * self._mesh.nodes >= SINGLE:
+            stored: Real | Single = matrix if matrix.flags.c_contiguous else matrix.copy()
+            if single:
                 with np.errstate(over="ignore"):
                     stored = stored.astype(np.float32)
             inverse.matrix = stored if np.isfinite(stored).all() else None

@@ -107,8 +107,8 @@ class TipRules:
             jumps = self._jumps(contact, group)[:, : group.forms.intensity.shape[1]]
             factors = (modulus / np.sqrt(group.length))[:, None] * (jumps @ group.forms.intensity.T)
             first = group.pair[:, :per_element]
-            opens = (contact.opening != self.gap)[first].any(axis=1)
-            slides = (contact.slip != 0)[first].any(axis=1)
+            opens = (contact.opening[first] != self.gap[first]).any(axis=1)
+            slides = (contact.slip[first] != 0).any(axis=1)
             KI[group.tip] = np.where(opens, factors[:, 0], 0.0)
             KII[group.tip] = np.where(slides, factors[:, 1], 0.0)
         return KI.reshape(-1, 2) + 0.0, KII.reshape(-1, 2) + 0.0  # no negative zeros
@@ -119,7 +119,7 @@ class TipRules:
         J = self._start()
         for group in self.groups:
             jumps = self._jumps(contact, group)[:, : len(group.forms.release)]
-            form = np.einsum("ki,ij,kj->k", jumps, group.forms.release, jumps, optimize=True)
+            form = ((jumps @ group.forms.release) * jumps).sum(axis=1)
             J[group.tip] = group.material.plane_modulus / group.length * form
         return J.reshape(-1, 2) + 0.0
 
@@ -169,7 +169,8 @@ class TipRules:
 
     def _jumps(self, contact: ContactState, group: _Alike) -> Real:
         """Jumps (k, 2 m (p + 1)) as TipForms takes them, but for the length."""
-        opening, slip = (contact.opening - self.gap)[group.pair], contact.slip[group.pair]
+        # Of the group's pairs alone: all of the model's once for each group would be the most of a step of a network.
+        opening, slip = contact.opening[group.pair] - self.gap[group.pair], contact.slip[group.pair]
         jump = -(opening + 1j * slip) * self.mesh.pairs.normal[group.pair]
         turned = jump * group.sense * np.conj(group.direction)[:, None]
         return np.stack([turned.real, turned.imag], axis=2).reshape(len(turned), -1)

@@ -50,6 +50,7 @@ class _Side:
 
 def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Imported:
     """The case of a mesh. Raises PbemError with what is wrong with it."""
+    _tell_same(grid)
     _set_lines_apart(grid)
     if not grid.surfaces:
         return make_map_case(path, _read_traces(grid), options, command)
@@ -57,6 +58,7 @@ def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Im
     left_out: list[str] = []
     regions, materials = _name_regions(grid, left_out)
     sides, entities = _find_sides(path, grid, regions, left_out)
+    left_out += _list_points(grid)
     curves = _make_curves(grid, sides, entities)
     names = _name_curves(grid, curves)
     tables = _make_tables(path, names, materials, options)
@@ -97,7 +99,8 @@ def _refuse(path: Path, options: Options) -> None:
 
 def _read_traces(grid: Grid) -> Reading:
     """The lines of a mesh without surfaces, as traces."""
-    reading = Reading(notes=[*grid.notes, "The mesh has no surfaces: its lines are treated as traces."])
+    notes = [*grid.notes, "The mesh has no surfaces: its lines are treated as traces."]
+    reading = Reading(notes=notes, left_out=_list_points(grid))
     groups: dict[int, dict[Edge, int]] = defaultdict(dict)
     for cell in grid.lines:
         groups[cell.group].setdefault(_key(*cell.corners), cell.entity)
@@ -118,6 +121,20 @@ def _read_traces(grid: Grid) -> Reading:
 
 def _key(a: int, b: int) -> Edge:
     return (a, b) if a < b else (b, a)
+
+
+def _tell_same(grid: Grid) -> None:
+    """Say which physical groups have the same name as another one of their dimension."""
+    used = {1: {cell.group for cell in grid.lines}, 2: {cell.group for cell in grid.surfaces}}
+    for dimension, what in ((1, "lines"), (2, "surfaces")):
+        groups: dict[str, list[str]] = defaultdict(list)
+        for group in sorted(used[dimension]):
+            if (dimension, group) in grid.names:
+                groups[grid.names[dimension, group]].append(str(group))
+        grid.notes += [
+            f"Physical {what} {', '.join(numbers)} have the same name, '{name}'."
+            for name, numbers in groups.items() if len(numbers) > 1
+        ]
 
 
 def _choose_name(wanted: str, taken: set[str]) -> str:
@@ -187,6 +204,7 @@ def _find_sides(
               f"{len(owners)} surface elements at one edge", "two at most")
         for (a, b), owners in around.items() if len(owners) > 2
     ]  # fmt: skip
+    faults += _find_doubled(grid, around)
     if faults:
         raise fail(path, faults)
     lines: dict[Edge, Cell] = {}
@@ -205,6 +223,31 @@ def _find_sides(
         f"{count} lines of {_name_group(grid, group)}, on which no surface ends" for group, count in astray.items()
     ]
     return sides, {edge: cell.entity for edge, cell in lines.items()}
+
+
+def _find_doubled(grid: Grid, around: Mapping[Edge, Sequence[str]]) -> list[Fault]:
+    """A fault of the edges that bound a surface each, and lie in the same places with nodes of their own."""
+    first: dict[frozenset[complex], Edge] = {}
+    doubled = [
+        (edge, other) for edge, owners in around.items() if len(owners) == 1
+        and (other := first.setdefault(frozenset(grid.nodes[node] for node in edge), edge)) != edge
+    ]
+    if not doubled:
+        return []
+    (a, b), (c, d) = doubled[0]
+    place = format_place(0.5 * (grid.nodes[a] + grid.nodes[b]))
+    others = f", and {len(doubled) - 1} more such place{'s' * (len(doubled) > 2)}" if len(doubled) > 1 else ""
+    found = f"two edges, between the nodes {c}, {d} and {a}, {b}{others}"
+    return [Fault(f"the edge at {place}", found, "one edge with nodes that both sides share (RemoveDuplicateNodes of "
+                  "gmsh); a physical line inside of a surface is a crack without doubled nodes")]
+
+
+def _list_points(grid: Grid) -> list[str]:
+    """Physical points, which nothing is made of."""
+    return [
+        f"{count} point{'s' * (count > 1)} of the physical point '{grid.names.get((0, group), str(group))}'"
+        for group, count in grid.points.items()
+    ]
 
 
 def _name_group(grid: Grid, group: int) -> str:
@@ -238,17 +281,21 @@ def _name_curves(
     """
     found: dict[str, list[tuple[_Side, Outline, list[int]]]] = {}
     untold = []
+    told = {side.group: _name_line(grid, side.group) for side, _ in curves if side.group}
     for side, legs in curves:
         if side.group:
-            name = "".join(each for each in grid.names.get((1, side.group), f"line_{side.group}") if each.isprintable())
+            name = told[side.group]
         else:
             name = "_".join(dict.fromkeys(side.regions)) + ("_edge" if len(side.regions) == 1 else "")
+            # Conditions of a physical line are those of its curves alone.
+            while name in told.values():
+                name += "_"
             untold.append(name)
         done = 0
         for part in outline(legs, 1e-9 * sum(leg.length for leg in legs)):
             own = legs[done:done + part.legs]
             done += part.legs
-            found.setdefault(name.strip() or "unnamed", []).append((side, part, [leg.elements for leg in own]))
+            found.setdefault(name, []).append((side, part, [leg.elements for leg in own]))
     if untold:
         grid.notes.append(f"Named here, as no physical line does: {', '.join(dict.fromkeys(untold))}.")
     taken = set(found)
@@ -263,6 +310,11 @@ def _name_curves(
             taken.add(curve)
             named.append((curve, side, part, counts))
     return named
+
+
+def _name_line(grid: Grid, group: int) -> str:
+    """The name of a physical line, of characters that can be seen."""
+    return "".join(filter(str.isprintable, grid.names.get((1, group), f"line_{group}"))).strip() or "unnamed"
 
 
 def _make_tables(

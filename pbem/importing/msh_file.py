@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import contextlib
 import io
-import shlex
 import warnings
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pbem.errors import CaseError, Fault, PbemError
 from pbem.importing.reading import Reading, fail, read_text
+from pbem.wording import list_names
 
 # Number of nodes of the kinds of elements; of the corners, which come first; and of those on each edge, which follow.
 LINES = {1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
 SURFACES = {2: (3, 3, 0), 3: (4, 4, 0), 9: (6, 3, 1), 10: (9, 4, 1), 16: (8, 4, 1), 21: (10, 3, 2), 23: (15, 3, 3),
             36: (16, 4, 2), 37: (25, 4, 3)}
 POINT = 15
+# Dimension and tag.
+Entity = tuple[int, int]
 SEVERAL = "For entities with several physical groups the first one is used."
 VERSIONS = ("2", "2.1", "2.2", "4.1")
 EXPECTED = "a mesh of gmsh, version 2.2 or 4.1"
@@ -33,12 +36,22 @@ class Cell:
     entity: int
 
 
+@dataclass(frozen=True)
+class _Entity:
+    """A geometrical entity, or the part of one that a partition has. tag: of the whole one, 0 if it is part of one of a
+    higher dimension; groups: numbers of its physical groups; partitions: that have it."""
+
+    tag: int
+    groups: tuple[int, ...]
+    partitions: tuple[int, ...] = ()
+
+
 @dataclass
 class Grid:
     """What a mesh holds.
 
     nodes: by tag; names: of physical groups, by dimension and number; between: nodes of edges of higher order, by the
-    tags of both corners, from the smaller one to the other.
+    tags of both corners, from the smaller one to the other; points: numbers of those of physical groups, by group.
     """
 
     nodes: dict[int, complex] = field(default_factory=dict)
@@ -48,11 +61,14 @@ class Grid:
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     between: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
+    points: Counter[int] = field(default_factory=Counter)
     groups: dict[frozenset[int], int] = field(default_factory=dict, repr=False)
 
     def add(self, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
         """Take in an element. Raises ValueError for one that no plane has."""
         if kind == POINT:
+            if group:
+                self.points[group] += 1
             return
         if kind not in LINES and kind not in SURFACES:
             raise ValueError(f"an element of type {kind}; expected points, lines, triangles and quadrangles of a plane")
@@ -136,7 +152,7 @@ def read_grid(path: Path, text: str) -> Grid:
 
 def _read_sections(lines: _Lines, grid: Grid) -> None:
     version = ""
-    physical: dict[tuple[int, int], list[int]] = {}
+    known: dict[Entity, _Entity] = {}
     while not lines.ended:
         title = lines.next()
         if not title:
@@ -155,11 +171,13 @@ def _read_sections(lines: _Lines, grid: Grid) -> None:
                 dimension, number, name = _read_name(lines.next())
                 grid.names[dimension, number] = name
         elif section == "Entities" and version == "4.1":
-            physical = _read_entities(lines)
+            known |= _read_entities(lines)
+        elif section == "PartitionedEntities" and version == "4.1":
+            known |= _read_partitions(lines, known)
         elif section == "Nodes":
             (_read_nodes_4 if version == "4.1" else _read_nodes_2)(lines, grid)
         elif section == "Elements" and version == "4.1":
-            _read_elements_4(lines, grid, physical)
+            _read_elements_4(lines, grid, known)
         elif section == "Elements":
             _read_elements_2(lines, grid)
         else:
@@ -174,10 +192,12 @@ def _read_sections(lines: _Lines, grid: Grid) -> None:
 
 
 def _read_name(line: str) -> tuple[int, int, str]:
-    words = shlex.split(line)
-    if len(words) != 3:
+    words = line.split(maxsplit=2)
+    name = words[-1] if words else ""
+    quoted = len(name) > 1 and name[0] == name[-1] == '"'
+    if len(words) != 3 or ('"' in name and not quoted):
         raise ValueError(f'\'{line[:60]}\'; expected dimension, number and "name" of a physical group')
-    return _read_integer(words[0]), _read_integer(words[1]), words[2]
+    return _read_integer(words[0]), _read_integer(words[1]), name[1:-1] if quoted else name
 
 
 def _read_node(grid: Grid, tag: int, words: list[str]) -> None:
@@ -207,34 +227,90 @@ def _read_nodes_4(lines: _Lines, grid: Grid) -> None:
             _read_node(grid, tag, lines.words(3))
 
 
-def _read_entities(lines: _Lines) -> dict[tuple[int, int], list[int]]:
-    """Numbers of the physical groups, by dimension and tag of the entity."""
-    physical = {}
+def _read_entities(lines: _Lines) -> dict[Entity, _Entity]:
+    """Entities by dimension and tag."""
+    known = {}
     for dimension, count in enumerate(lines.integers(4)[:4]):
         for _ in range(count):
             words = lines.words(5 if dimension == 0 else 8)
-            at = 4 if dimension == 0 else 7
-            groups = [_read_integer(word) for word in words[at + 1:at + 1 + _read_integer(words[at])]]
-            physical[dimension, _read_integer(words[0])] = groups
-    return physical
+            tag = _read_integer(words[0])
+            known[dimension, tag] = _Entity(tag, _read_list(words, 4 if dimension == 0 else 7)[0])
+    return known
+
+
+def _read_partitions(lines: _Lines, whole: Mapping[Entity, _Entity]) -> dict[Entity, _Entity]:
+    """The parts that partitions make of entities, which belong to the groups of these; and the curves between parts of
+    a surface, which belong to none."""
+    lines.integers()
+    for _ in range(lines.integers()[0]):
+        lines.next()  # a layer of elements that another partition has
+    known = {}
+    for dimension, count in enumerate(lines.integers(4)[:4]):
+        for _ in range(count):
+            words = lines.words(5)
+            tag, *parent = (_read_integer(word) for word in words[:3])
+            partitions, after = _read_list(words, 3)
+            groups = _read_list(words, after + (3 if dimension == 0 else 6))[0]
+            above = whole.get((parent[0], parent[1]))
+            own = parent[0] == dimension
+            known[dimension, tag] = _Entity(
+                parent[1] if own else 0, (above.groups if own and above is not None else groups) if own else (),
+                partitions if own else (),
+            )
+    return known
+
+
+def _read_list(words: list[str], at: int) -> tuple[tuple[int, ...], int]:
+    """Whole numbers after their count; and where the words go on after them."""
+    if at >= len(words):
+        raise ValueError(f"'{' '.join(words)[:60]}'; expected {at + 1} numbers")
+    end = at + 1 + _read_integer(words[at])
+    if end > len(words):
+        raise ValueError(f"'{' '.join(words)[:60]}'; expected {end} numbers")
+    return tuple(_read_integer(word) for word in words[at + 1:end]), end
 
 
 def _read_elements_2(lines: _Lines, grid: Grid) -> None:
+    own: set[int] = set()
+    ghosts: set[int] = set()
     for _ in range(lines.integers()[0]):
         numbers = lines.integers(4)
         kind, count = numbers[1], numbers[2]
         tags, nodes = numbers[3:3 + count], tuple(numbers[3 + count:])
         _add(grid, kind, nodes, tags[0] if tags else 0, tags[1] if len(tags) > 1 else 0)
+        if len(tags) > 3 and kind in SURFACES:
+            own.add(tags[3])
+            ghosts |= {-tag for tag in tags[4:] if tag < 0}
+    _refuse_parts(own, ghosts - own)
+    if len(own) == 1:
+        grid.notes.append(f"All surface elements are of partition {min(own)}: if a mesh in partitions was written to "
+                          "several files, this one holds only a part of it.")
 
 
-def _read_elements_4(lines: _Lines, grid: Grid, physical: dict[tuple[int, int], list[int]]) -> None:
+def _read_elements_4(lines: _Lines, grid: Grid, known: Mapping[Entity, _Entity]) -> None:
+    filled: set[int] = set()
     for _ in range(lines.integers(4)[0]):
-        dimension, entity, kind, count = lines.integers(4)[:4]
-        groups = physical.get((dimension, entity), [])
-        if len(groups) > 1 and SEVERAL not in grid.notes:
+        dimension, tag, kind, count = lines.integers(4)[:4]
+        entity = known.get((dimension, tag), _Entity(tag, ()))
+        if len(entity.groups) > 1 and SEVERAL not in grid.notes:
             grid.notes.append(SEVERAL)
         for _ in range(count):
-            _add(grid, kind, tuple(lines.integers()[1:]), groups[0] if groups else 0, entity)
+            _add(grid, kind, tuple(lines.integers()[1:]), entity.groups[0] if entity.groups else 0, entity.tag)
+        filled |= set(entity.partitions) if dimension == 2 and count else set()
+    named = {part for (dimension, _), entity in known.items() if dimension == 2 for part in entity.partitions}
+    _refuse_parts(filled, named - filled)
+
+
+def _refuse_parts(own: set[int], missing: set[int]) -> None:
+    """Raise ValueError for one file of several that a mesh was written to. own: partitions with surface elements;
+    missing: those that are named and have none."""
+    if own and missing:
+        found = f"surface elements of {_list_partitions(own)}, none of {_list_partitions(missing)}"
+        raise ValueError(f"{found}; expected the whole mesh in one file (Mesh.PartitionSplitMeshFiles = 0)")
+
+
+def _list_partitions(numbers: set[int]) -> str:
+    return f"partition{'s' * (len(numbers) > 1)} {list_names([str(number) for number in sorted(numbers)])}"
 
 
 def _add(grid: Grid, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
@@ -264,6 +340,10 @@ def _check(grid: Grid) -> list[Fault]:
 
 def _read_by_meshio(path: Path) -> Grid:
     """A binary mesh."""
+    if b"$PartitionedEntities" in path.read_bytes():
+        # Of which meshio reads no groups.
+        expected = "a mesh in one part (UnpartitionMesh of gmsh) or a text (gmsh -bin 0)"
+        raise fail(path, [Fault("the file", "a binary mesh in partitions", expected)])
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -291,11 +371,10 @@ def _take(mesh: Any, path: Path) -> Grid:
     grid = Grid(names={(int(dimension), int(number)): name for name, (number, dimension) in mesh.field_data.items()})
     for tag, (x, y, z) in enumerate(mesh.points):
         _read_node(grid, tag, [repr(float(value)) for value in (x, y, z)])
-    kinds = {"line": 1, "line3": 8, "line4": 26, "line5": 27, "line6": 28, "triangle": 2, "triangle6": 9,
-             "triangle10": 21, "triangle15": 23, "quad": 3, "quad8": 16, "quad9": 10, "quad16": 36, "quad25": 37}
+    kinds = {"vertex": POINT, "line": 1, "line3": 8, "line4": 26, "line5": 27, "line6": 28, "triangle": 2,
+             "triangle6": 9, "triangle10": 21, "triangle15": 23, "quad": 3, "quad8": 16, "quad9": 10, "quad16": 36,
+             "quad25": 37}
     for number, block in enumerate(mesh.cells):
-        if block.type == "vertex":
-            continue
         if block.type not in kinds:
             expected = "lines, triangles and quadrangles of a plane"
             raise fail(path, [Fault("the mesh", f"elements '{block.type}'", expected)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 # Group, entity and nodes of an element.
 Element = tuple[int, int, tuple[int, ...]]
@@ -158,4 +158,39 @@ def write_4(mesh: Mesh) -> str:
         for own in elements_of:
             number += 1
             text.append(" ".join(map(str, (number, *own))))
+    return "\n".join([*text, "$EndElements"]) + "\n"
+
+
+def write_parts(mesh: Mesh, partition: Callable[[complex], int], kept: Sequence[int] = (1, 2)) -> str:
+    """The text of version 4.1 of a mesh in two partitions, which have entities of their own, numbered from 101 on, with
+    a layer of the other one's elements, and the groups at the whole entities alone. kept: partitions whose elements are
+    in the file."""
+    nodes, lines, surfaces, names = mesh
+    parts: dict[tuple[int, int, int], list[tuple[int, ...]]] = {}
+    for dimension, elements in ((1, lines), (2, surfaces)):
+        for _, entity, own in elements:
+            number = partition(sum(nodes[node] for node in own) / len(own))
+            parts.setdefault((dimension, entity, number), []).append(own)
+    groups = {(dimension, entity): group for dimension, own in ((1, lines), (2, surfaces)) for group, entity, _ in own}
+    counts = [[sum(key[0] == dimension for key in own) for dimension in (1, 2)] for own in (groups, parts)]
+    text = [*_begin("4.1", names), "$Entities", f"0 {counts[0][0]} {counts[0][1]} 0"]
+    text += [f"{entity} 0 0 0 1 1 0 1 {group} 0" for (_, entity), group in groups.items()]
+    text += ["$EndEntities", "$PartitionedEntities", "2", "2", "201 1", "202 2"]
+    text.append(f"0 {counts[1][0] + 1} {counts[1][1]} 0")
+    own_tags = {key: 101 + number for number, key in enumerate(parts)}
+    for (dimension, entity, number), tag in own_tags.items():
+        text.append(f"{tag} {dimension} {entity} 1 {number} 0 0 0 1 1 0 0 0")
+        if tag == 100 + counts[1][0]:
+            text.append("100 2 1 2 1 2 0 0 0 1 1 0 0 0")  # a curve between the parts of a surface
+    text += ["$EndPartitionedEntities", "$Nodes", f"1 {len(nodes)} 1 {max(nodes)}", f"2 101 0 {len(nodes)}"]
+    text += [*map(str, nodes), *(f"{z.real!r} {z.imag!r} 0" for z in nodes.values()), "$EndNodes"]
+    filled = {key: own for key, own in parts.items() if key[2] in kept}
+    total = sum(map(len, filled.values()))
+    text += ["$Elements", f"{len(filled)} {total} 1 {total}"]
+    number = 0
+    for key, own in filled.items():
+        text.append(f"{key[0]} {own_tags[key]} {KINDS[key[0], len(own[0])]} {len(own)}")
+        for each in own:
+            number += 1
+            text.append(" ".join(map(str, (number, *each))))
     return "\n".join([*text, "$EndElements"]) + "\n"

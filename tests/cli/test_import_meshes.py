@@ -1,0 +1,122 @@
+"""`pbem import` of meshes as partitioning, crack plugins and other hands leave them."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pbem.cli import main
+from tests.cli.gmsh_sample import Mesh, make_block, make_row, write_2, write_4, write_parts
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def bring_in(text: str) -> dict[str, Any]:
+    """The tables of the case of a mesh."""
+    Path("mesh.msh").write_text(text, encoding="utf-8")
+    assert main(["import", "mesh.msh", "-o", "made.toml", "--force"]) == 0
+    return tomllib.loads(Path("made.toml").read_text(encoding="utf-8"))
+
+
+def refuse(text: str | bytes, capsys: Capture) -> str:
+    """What is said of a mesh that is refused."""
+    Path("mesh.msh").write_bytes(text if isinstance(text, bytes) else text.encode())
+    assert main(["import", "mesh.msh", "-o", "made.toml", "--force"]) == 2
+    return capsys.readouterr().err
+
+
+def name_again(mesh: Mesh, names: dict[tuple[int, int], str]) -> Mesh:
+    """The mesh with other names of its groups."""
+    return mesh[0], mesh[1], mesh[2], {**mesh[3], **names}
+
+
+def test_a_mesh_in_partitions_has_the_groups_of_the_whole() -> None:
+    # Left and right half; the lower and the upper one are of two materials.
+    block = make_block(2, 2)
+    whole = bring_in(write_4(block))
+    parts = bring_in(write_parts(block, lambda z: 1 if z.real < 0.5 else 2))
+    assert parts["regions"] == whole["regions"] and parts["materials"] == whole["materials"]
+    for name, curve in whole["curves"].items():
+        assert sorted(parts["curves"][name]["points"]) == sorted(curve["points"])
+        assert parts["curves"][name]["elements"] == curve["elements"]
+
+
+def test_one_file_of_a_mesh_in_several_is_refused(capsys: Capture) -> None:
+    said = refuse(write_parts(make_block(2, 2), lambda z: 1 if z.real < 0.5 else 2, kept=[2]), capsys)
+    assert "found surface elements of partition 2, none of partition 1; expected the whole mesh in one file" in said
+
+
+@pytest.mark.parametrize("ghosts", [True, False])
+def test_one_file_of_several_of_version_2_is_refused_or_told(ghosts: bool, capsys: Capture) -> None:
+    # Number of partitions of an element, its own one, and with a minus sign others that have it as a ghost.
+    lines = write_2(make_row()).splitlines()
+    first = lines.index("$Elements") + 2
+    for number in range(first, lines.index("$EndElements")):
+        index, kind, _, group, entity, *nodes = lines[number].split()
+        tags = ["5", group, entity, "2", "3", "-1"] if ghosts else ["4", group, entity, "1", "3"]
+        lines[number] = " ".join([index, kind, *tags, *nodes])
+    text = "\n".join(lines) + "\n"
+    if ghosts:
+        assert "found surface elements of partition 3, none of partition 1" in refuse(text, capsys)
+    else:
+        assert list(bring_in(text)["regions"]) == ["ends.1", "ends.2", "core"]
+        assert "All surface elements are of partition 3" in capsys.readouterr().out
+
+
+def test_a_binary_mesh_in_partitions_is_refused_for_that_reason(capsys: Capture) -> None:
+    said = refuse(b"$MeshFormat\n4.1 1 8\n\1\0\0\0\n$EndMeshFormat\n$PartitionedEntities\n", capsys)
+    assert "found a binary mesh in partitions; expected a mesh in one part" in said
+
+
+def test_names_are_what_stands_between_the_quotation_marks() -> None:
+    tables = bring_in(write_2(name_again(make_block(2, 2), {(1, 1): "it's", (1, 2): "to#p", (2, 1): "a=b\\"})))
+    assert list(tables["curves"])[:2] == ["it's", "to#p"] and list(tables["regions"]) == ["a=b\\", "upper"]
+
+
+def test_groups_of_one_name_are_told(capsys: Capture) -> None:
+    tables = bring_in(write_2(name_again(make_block(2, 2), {(1, 2): "bottom", (2, 2): "lower"})))
+    assert list(tables["curves"])[:2] == ["bottom.1", "bottom.2"] and list(tables["regions"]) == ["lower", "lower_2"]
+    said = capsys.readouterr().out
+    assert "Physical lines 1, 2 have the same name, 'bottom'." in said
+    assert "Physical surfaces 1, 2 have the same name, 'lower'." in said
+
+
+def test_conditions_of_a_physical_line_are_not_those_of_edges_without_one() -> None:
+    # The sides have no lines, and would be called as the bottom is.
+    nodes, lines, surfaces, names = make_block(2, 2)
+    rest = [line for line in lines if line[0] not in (4, 5)]
+    tables = bring_in(write_2((nodes, rest, surfaces, {**names, (1, 1): "lower_edge"})))
+    assert tables["curves"]["lower_edge"]["points"] == [[0, 0], [1, 0]]
+    assert {"lower_edge_.1", "lower_edge_.2", "upper_edge.1", "upper_edge.2"} < set(tables["curves"])
+
+
+def test_physical_points_are_left_out_and_told(capsys: Capture) -> None:
+    nodes, lines, surfaces, names = make_block(2, 2)
+    text = write_2((nodes, lines, surfaces, {**names, (0, 9): "pin"}))
+    count = len(lines) + len(surfaces)
+    text = text.replace(f"$Elements\n{count}\n", f"$Elements\n{count + 1}\n{count + 1} 15 2 9 9 1\n")
+    bring_in(text)
+    assert "1 point of the physical point 'pin'" in capsys.readouterr().out
+
+
+def test_edges_that_lie_on_each_other_without_common_nodes_are_refused_with_them(capsys: Capture) -> None:
+    # The seam is doubled, as for a contact or by a plugin for cracks.
+    nodes, lines, surfaces, names = make_block(2, 2)
+    doubled = {tag: 100 + tag for tag, z in nodes.items() if z.imag == 1}
+    upper = [
+        (group, entity, tuple(doubled.get(node, node) for node in own) if group == 2 else own)
+        for group, entity, own in surfaces
+    ]
+    nodes = nodes | {new: nodes[tag] for tag, new in doubled.items()}
+    said = refuse(write_2((nodes, [line for line in lines if line[0] < 4], upper, names)), capsys)
+    assert "the edge at (0.25, 1): found two edges" in said and "and 1 more such place;" in said

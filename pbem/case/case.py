@@ -12,7 +12,7 @@ from pbem.case.changed import change_draft, label_key
 from pbem.case.reader import parse_draft, read_case_text
 from pbem.case.writer import write_tables
 from pbem.description import case as description
-from pbem.errors import CaseError
+from pbem.errors import CaseError, PbemError
 
 
 class Case(description.Case):
@@ -71,8 +71,15 @@ class Case(description.Case):
         return same
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write a case file that reads back to the same case. Paths of files of custom laws are written as given."""
-        Path(path).write_text(self.text, encoding="utf-8")
+        """Write a case file that reads back to the same case. Paths of files of custom laws are written as given.
+
+        Raises PbemError if it cannot be written there.
+        """
+        try:
+            Path(path).write_text(self.text, encoding="utf-8")
+        except OSError as error:
+            raise PbemError(f"{path}: cannot be written ({error.strerror or error}); expected the path of a file in a "
+                            "folder that is there") from None
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:

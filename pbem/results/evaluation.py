@@ -32,8 +32,11 @@ Side = Literal["first", "second"]
 # More products of points and elements than this are summed by cluster trees, to this relative error.
 DIRECT = 1_000_000
 TOLERANCE = 1e-6
-# Squares of distances to points beyond would be no numbers any more.
-FARTHEST = 1e100
+# Points beyond are nowhere: a case has no larger numbers, and squares of them would be none any more.
+LARGEST = 1e100
+# What the boundary makes, which falls with the distance, is that at so many times its extent for all points beyond:
+# powers of their distances would be no numbers any more.
+FARTHEST = 1e30
 # A point is on a tip up to this part of the element there.
 NEAR_TIP = 1e-6
 
@@ -81,13 +84,14 @@ class Evaluator:
         run, given = self._run, read_points(points)
         mesh, model = run.mesh, run.model
         own = given - model.origin
-        finite = np.abs(given) < FARTHEST
+        finite = np.abs(given) < LARGEST
+        near = _pull_in(np.where(finite, own, 0), FARTHEST * (abs(model.origin) + run.faces.extent))
         infinite = np.array(model.turns_outside)
         reach = np.maximum(np.where(finite, np.abs(given), 0.0), abs(model.origin) + run.faces.extent)
-        where = find_points(mesh, run.faces, infinite, np.where(finite, own, 0), reach, side == "second")
+        where = find_points(mesh, run.faces, infinite, near, reach, side == "second")
         where.region[~finite], where.face[~finite] = -1, -1
         location = Location(where.region, where.face, where.s)
-        field = self._place(own, location)
+        field = self._place(near, location)
         at_tip = _find_tips(reach, tips - model.origin, where, run)
         displacement, stress = np.empty((len(steps), len(own), 2)), np.empty((len(steps), len(own), 3))
         for k, values in enumerate(self._evaluate_steps(own, where, field, steps)):
@@ -206,6 +210,13 @@ def read_points(points: ArrayLike) -> Complex:
     if values.ndim != 2 or values.shape[1] != 2:
         raise ValueError(f"points: expected shape (q, 2), x and y of every point; found {np.shape(points)}")
     return np.asarray(values[:, 0] + 1j * values[:, 1])
+
+
+def _pull_in(points: Complex, farthest: float) -> Complex:
+    """Points (q,) no further from 0 than a distance: those beyond in their directions."""
+    distance = np.abs(points)
+    beyond = distance > farthest
+    return np.where(beyond, points / np.where(beyond, distance, 1.0) * farthest, points)
 
 
 def evaluate_face_limits(

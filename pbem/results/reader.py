@@ -147,9 +147,9 @@ class Results:
         """Displacement, stress and region at any points (q, 2): `.displacement` (k, q, 2), `.stress` (k, q, 3).
 
         steps: indices of k stored steps, negative from the end; all by default. Stress is sxx, syy, sxy. Outside all
-        regions the values are NaN and `.region` is "". On an outer boundary they are the limits from inside; on a crack
-        or interface those of the first side, or of the second with side="second". At crack tips, where the stress is
-        infinite, it is NaN. Only the result file is needed.
+        regions, and for coordinates beyond 1e100, the values are NaN and `.region` is "". On an outer boundary they are
+        the limits from inside; on a crack or interface those of the first side, or of the second with side="second". At
+        crack tips, where the stress is infinite, it is NaN. Only the result file is needed.
 
         Raises ValueError for points of another shape or an unknown side, IndexError for a step that is not stored,
         ResultFileError for files without stored steps and those of earlier versions.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import h5py
@@ -13,6 +14,7 @@ from pbem.results.contents import Errors, Steps, Tips
 from pbem.results.layout import TIP_DATASETS, count_steps
 from pbem.results.lazy import InteriorPoints
 from pbem.results.opening import freeze, read_names
+from pbem.results.trace_names import is_piece, number_piece
 
 
 def read_energy(file: h5py.File, kind: str, k: int) -> Real:
@@ -41,19 +43,54 @@ def read_reactions(file: h5py.File, steps: int) -> dict[str, Real]:
     return {name: together[:, number] for number, name in enumerate(names)}
 
 
-def read_tips(file: h5py.File, steps: int) -> dict[str, Tips]:
+class CrackTips(Mapping[str, Tips]):
+    """The tips of cracks by name, and of interfaces that end as a crack does.
+
+    The name of a trace that was cut into pieces (`t12` of `t12.1`, `t12.2`, ...) gives those of the trace: at the start
+    of its first piece and the end of the last one. The names that are listed, counted and asked for with `in` are those
+    of the pieces.
+    """
+
+    def __init__(self, tips: Mapping[str, Tips]) -> None:
+        self._tips = tips
+
+    def __getitem__(self, name: str) -> Tips:
+        if name in self._tips:
+            return self._tips[name]
+        pieces = sorted((each for each in self._tips if is_piece(each, name)), key=number_piece)
+        if not pieces:
+            raise KeyError(name)
+        first, last = (self._tips[pieces[at]] for at in (0, -1))
+        joined = {
+            kind: freeze(np.stack([getattr(first, kind)[:, 0], getattr(last, kind)[:, 1]], axis=1))
+            for kind in TIP_DATASETS
+        }
+        same = first.plane_modulus == last.plane_modulus
+        return Tips(**joined, plane_modulus=first.plane_modulus if same else np.nan)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._tips
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tips)
+
+    def __len__(self) -> int:
+        return len(self._tips)
+
+
+def read_tips(file: h5py.File, steps: int) -> CrackTips:
     """Stress-intensity factors, J and T (steps, 2) at both ends of each crack; NaN where the file lacks them."""
     names = read_names(file["tips"])
     if not names:
-        return {}
+        return CrackTips({})
     group = file["all/tips"]
     unknown = np.full((steps, len(names), 2), np.nan)  # to older versions
     values = {kind: freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS}
     moduli = group["plane_modulus"][...] if "plane_modulus" in group else np.full(len(names), np.nan)
-    return {
+    return CrackTips({
         name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
         for number, name in enumerate(names)
-    }
+    })
 
 
 def read_errors(file: h5py.File, steps: int) -> Errors:

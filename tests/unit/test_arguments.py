@@ -101,3 +101,9 @@ def test_what_is_set_is_a_dictionary(odd: Any, tmp_path: Path) -> None:
         with pytest.raises(pbem.CaseError, match=r"what is set: found .*; expected a dictionary"):
             pbem.run(source, tmp_path / "blocks.h5", set=odd)
     assert not (tmp_path / "blocks.h5").exists()
+
+
+@pytest.mark.parametrize(("path", "reason"), [(".", "Is a directory"), ("there/is/no/such.toml", "No such file")])
+def test_a_case_that_cannot_be_written_says_where_and_why(tmp_path: Path, path: str, reason: str) -> None:
+    with pytest.raises(pbem.PbemError, match=f"cannot be written \\({reason}.*expected the path of a file"):
+        pbem.Case(**tomllib.loads(BLOCKS)).write(tmp_path / path)

@@ -106,6 +106,18 @@ def test_points_outside_are_named_nothing(kirsch: Results) -> None:
     assert none.displacement.shape == (1, 0, 2) and none.stress.shape == (1, 0, 3)
 
 
+@pytest.mark.parametrize("distance", [1e5, 1e40, 1e80, 1e99])
+def test_far_from_a_crack_the_field_is_the_remote_one(griffith: Results, distance: float) -> None:
+    # The strain of a stress of 1 along y in plane strain.
+    far = distance * np.array([[1.0, 0.5], [0.0, -1.0]])
+    found = griffith.evaluate(far, [-1])
+    assert found.region.tolist() == ["plane", "plane"]
+    np.testing.assert_allclose(found.stress[0], [[0.0, 1.0, 0.0]] * 2, atol=1e-3)
+    strain = np.array([-(1 + ROCK.poisson) * ROCK.poisson / ROCK.young, 1 / ROCK.plane_modulus])
+    moved = found.displacement[0] / distance
+    np.testing.assert_allclose(moved, far / distance * strain, atol=1e-4 / ROCK.plane_modulus)
+
+
 def test_both_sides_of_an_interface(blocks: Results) -> None:
     seat = blocks.contact["joint"]
     at = int(np.argmax(np.abs(seat.slip[-1])))

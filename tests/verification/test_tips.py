@@ -344,3 +344,23 @@ def test_a_crack_by_expressions_is_as_curved_as_they_are(elements: int, tmp_path
     tips, exact = results.tips["arc"], arc_crack_intensity(1.0, half, 1.0)
     found = np.array([np.abs(each[-1]) for each in (tips.KI, tips.KII)])
     np.testing.assert_allclose(found, np.transpose([exact, exact]), atol={4: 2e-3, 8: 3e-4, 16: 1e-4}[elements])
+
+
+def test_a_trace_in_pieces_has_the_tips_of_the_trace(tmp_path: Path) -> None:
+    # In the order of their numbers, which is not that of the file: KI = sigma sqrt(pi a) at the ends of the whole.
+    results = pbem.run({
+        "materials": {"rock": {"young": 1000.0, "poisson": 0.2}},
+        "curves": {
+            "trace.2": {"points": [[0.5, 0.0], [1.0, 0.0]], "elements": 8},
+            "trace.1": {"points": [[-1.0, 0.0], [0.5, 0.0]], "elements": 8},
+        },
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["trace.2", "trace.1"]}},
+        "interfaces": {"trace": {"friction": 0.3}}, "remote": {"syy": 1.0}, "analysis": {"steps": 1},
+    }, tmp_path / "trace.h5")
+    tips = results.tips["trace"]
+    assert list(results.tips) == ["trace.2", "trace.1"] and "trace" not in results.tips
+    assert tips.KI[-1] == pytest.approx([np.sqrt(np.pi)] * 2, rel=2e-3)
+    assert tips.J[-1] * tips.plane_modulus == pytest.approx([np.pi] * 2, rel=5e-3)
+    assert tips.KI[-1].tolist() == [results.tips["trace.1"].KI[-1, 0], results.tips["trace.2"].KI[-1, 1]]
+    with pytest.raises(KeyError, match="trac"):
+        results.tips["trac"]

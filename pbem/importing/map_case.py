@@ -51,7 +51,7 @@ class _Scale:
 def make_map_case(path: Path, reading: Reading, options: Options, command: str) -> Imported:
     """The case of the traces that were read. Raises CaseError if there are none, or if their numbers make no map."""
     scale = _measure(path, reading, options)
-    renamed = set_apart([trace.name for trace in reading.traces])
+    renamed = set_apart([trace.name for trace in reading.traces], of_known=False)
     reading.traces = [replace(trace, name=renamed.get(trace.name, trace.name)) for trace in reading.traces]
     traces: Sequence[Trace] = reading.traces
     notes: list[str] = []

@@ -119,12 +119,13 @@ def _doubt_names(names: Sequence[str | None]) -> str:
     return "" if odd is None else f"cannot be used ({show(odd)} has blanks around it or signs that do not print)"
 
 
-def set_apart(names: Sequence[str]) -> dict[str, str]:
-    """New names of those that would be taken for pieces of another one, such as fault.1 where there is a fault."""
+def set_apart(names: Sequence[str], of_known: bool = True) -> dict[str, str]:
+    """New names of those that would be taken for pieces of another one, such as fault.1 where there is a fault; unless
+    of_known also where there is none: fault.1 and fault.2 would be one trace."""
     known, renamed = set(names), {}
     for name in names:
         stem, _, number = name.rpartition(".")
-        if stem in known and number.isdecimal():
+        if stem and number.isdecimal() and (stem in known or not of_known):
             new = f"{stem}_{number}"
             while new in known:
                 new += "_"

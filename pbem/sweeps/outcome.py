@@ -72,8 +72,9 @@ def list_quantity_names(model: Model, mesh: Mesh) -> Names:
     contact = tuple(sort_pairs(mesh))
     for name in dict.fromkeys((*model.curves, *contact)):
         stem, dot, piece = name.rpartition(".")
-        if dot and piece.isdecimal() and stem not in model.curves:
+        while dot and piece.isdecimal() and stem not in model.curves:
             families.setdefault(stem, []).append(name)
+            stem, dot, piece = stem.rpartition(".")  # of a piece that is cut again
     return Names(
         tuple(model.conditions), contact, tuple(list_tip_curves(model, mesh)),
         {name: tuple(members) for name, members in families.items()}, tuple(model.rigid),

@@ -186,6 +186,13 @@ def test_traces_with_names_of_pieces_of_others_have_laws_of_their_own(capsys: Ca
     assert [find_joint(model, name).law.cohesion for name in tables["curves"]] == [5, 5, 0, 0, 0, 0]
 
 
+def test_traces_that_would_be_pieces_of_none_are_told_apart(capsys: Capture) -> None:
+    # By what ends in a number, 1.1 and 1.2 would be the trace 1 in tables, pictures and laws.
+    tables = bring_in("map.csv", "id,x1,y1,x2,y2\n1.1,0,0,2,0\n1.2,0,1,2,1\n2.10,0,2,2,2\n2.10a,0,3,2,3\n")
+    assert list(tables["curves"]) == ["1_1", "1_2", "2_10", "2.10a"]
+    assert "3 of the traces called otherwise" in capsys.readouterr().out
+
+
 def test_parts_of_a_line_are_one_trace() -> None:
     data = json.loads(CROSS)
     data["features"][0]["geometry"] = {

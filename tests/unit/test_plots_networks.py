@@ -11,7 +11,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+import pbem
 from pbem.case.build import parse_model
+from pbem.mesh.generate import generate_mesh
 from pbem.results.animation import animate
 from pbem.results.curve_picture import find_curves
 from pbem.results.curve_profile import read_profile
@@ -31,7 +33,9 @@ from pbem.results.trace_plot import (
     plot_traces,
     sum_orientations,
 )
+from pbem.results.traces import list_traces
 from pbem.results.writer import ResultWriter
+from pbem.sweeps.outcome import list_quantity_names
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 from tests.unit.test_label_room import find_overlaps
 
@@ -193,6 +197,35 @@ def test_names_stand_for_traces_pieces_and_patterns() -> None:
     }  # fmt: skip
     with pytest.raises(ValueError, match=r"'t13'; did you mean .*; there is no .* 'seet'; did you mean"):
         find_names(["t13", "seet"], known)
+
+
+def test_pieces_that_are_cut_again_belong_to_their_trace(tmp_path: Path) -> None:
+    # The whole is in pieces as an import writes them, and one is crossed by a crack that was added.
+    crossing = {"x": {"points": [[-0.5, -0.5], [-0.4, 0.5]], "size": 0.4}}
+    halves = {"t.1": {"points": [[-1, 0], [0, 0]], "size": 0.4}, "t.2": {"points": [[0, 0], [1, 0]], "size": 0.4}}
+    found = {}
+    for name, curves in {"whole": {"t": {"points": [[-1, 0], [0, 0], [1, 0]], "size": 0.4}}, "pieces": halves}.items():
+        found[name] = pbem.run({
+            "materials": {"rock": {"young": 1000.0, "poisson": 0.25}}, "curves": {**curves, **crossing},
+            "regions": {"plane": {"material": "rock", "infinite": True, "cracks": [*curves, "x"]}},
+            "interfaces": {"t": {"friction": 0.25}, "x": {"friction": 0.6}},
+            "remote": {"syy": -1.0, "sxy": 0.5}, "analysis": {"steps": 1},
+        }, tmp_path / f"{name}.h5")
+    whole, cut = found["whole"], found["pieces"]
+    assert list(whole.contact)[:2] == ["t.1", "t.2"] and list(cut.contact)[:3] == ["t.1.1", "t.1.2", "t.2"]
+    for quantity in ("slip", "traction_n"):
+        one, other = (each.contact["t"].integrate(quantity)[-1] for each in (whole, cut))
+        assert other == pytest.approx(one, rel=0.02)
+        part = cut.contact["t.1"].integrate(quantity)[-1] + cut.contact["t.2"].integrate(quantity)[-1]
+        assert other == pytest.approx(part, rel=1e-12)
+    assert (np.diff(cut.contact["t"].arc_length) >= 0).all()
+    assert cut.tips["t"].KII[-1] == pytest.approx(whole.tips["t"].KII[-1], rel=0.02)
+    totals = {each.name: each for each in list_traces(cut)}
+    assert list(totals) == ["t", "x"] and totals["t"].pieces == 3 and totals["t"].length == pytest.approx(2.0)
+    assert find_names(["t", "t.1"], list(cut.contact)) == {"t": ["t.1.1", "t.1.2", "t.2"], "t.1": ["t.1.1", "t.1.2"]}
+    _, model = parse_model(cut.case)
+    names = list_quantity_names(model, generate_mesh(model))
+    assert names.families["t"] == ("t.1.1", "t.1.2", "t.2") and names.families["t.1"] == ("t.1.1", "t.1.2")
 
 
 def test_animations_have_a_frame_for_each_step(results: Results, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from pbem.description.case import Case
 from pbem.errors import CaseError, Fault, KeyPath
 from pbem.geometry.curve import Curve
-from pbem.geometry.junction import find_crossings, format_vector, split_at_junctions
+from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.approach import find_closing
 from pbem.model.coincidence import find_coincidences
@@ -37,6 +37,7 @@ from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
+from pbem.model.net_force import check_plane
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps, list_apart
 from pbem.model.piece_faults import check_interface_along
@@ -44,11 +45,10 @@ from pbem.model.point_loads import PointLoads, place_point_loads, split_at_point
 from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.pulled import check_pulled
 from pbem.model.recall import Recall
-from pbem.model.resultants import describe_unbalance, find_unbalanced_force
+from pbem.model.resultants import describe_unbalance
 from pbem.model.rigid_body_modes import (
     RigidBodyMode,
     find_least_stiffness,
-    find_plane_translations,
     find_rigid_body_modes,
     list_hold,
 )
@@ -307,14 +307,6 @@ def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
                for name, condition in model.conditions.items() if name in curves for stiffness in condition.stiffness)
 
 
-def _leave_out_point_loads(model: Model) -> Model:
-    """The model without weight and point loads, which may have a net force on an infinite region."""
-    none = {name: (0.0, 0.0, 0.0) for name in model.point_loads}
-    return replace(model, stages=tuple(
-        replace(stage, gravity=(0.0, 0.0), point_forces=none) for stage in model.stages
-    ))
-
-
 def _check_hold(
     model: Model, now: Model, stages: Sequence[int], motions: Sequence[RigidBodyMode], later: bool
 ) -> tuple[list[Fault], list[str]]:
@@ -363,29 +355,14 @@ def _check_support(model: Model, recall: Recall) -> tuple[list[Fault], list[str]
         free |= {motion.text: motion for motion in motions}
     faults += check_independent(list(model.point_supports.values()), list(free.values()))
     balanced = [*dict.fromkeys(balanced)]
-    regions = {region.name: region for region in model.regions}
     notes = []
     if model.closing:
         names = list_names([f"'{name}'" for name in sorted(model.closing)])
         notes.append(f"Nothing but {names} holds what the loads move, which does not touch yet: the search for its "
                      "contact begins where it first touches.")
-    for motion in find_plane_translations(model):
-        moving = [regions[name] for name in motion.regions]
-        name = next(each.name for each in moving if each.infinite)
-        unbalance = describe_unbalance(model, motion, moving)
-        if unbalance is None:
-            continue
-        if describe_unbalance(_leave_out_point_loads(model), motion, moving) is None:
-            force = find_unbalanced_force(model, motion, moving)
-            notes.append(f"Weight and point loads have a net force of {format_vector(force)} on the infinite region "
-                         f"'{name}', with the bodies in it and without excavated regions: its "
-                         "displacement grows with the logarithm of the distance, so that only stresses "
-                         "and relative displacements are meaningful.")
-        else:
-            found = f"a net force on the infinite region '{name}': {unbalance}"
-            expected = ("loads that balance, apart from moments: the displacement of a net force grows with the "
-                        "logarithm of the distance and has no value; or a finite region that is held")
-            faults.append(Fault.at(("regions", name), found, expected))
+    wrong, told = check_plane(model)
+    faults += wrong
+    notes += told
     chosen = "as far as no point support says otherwise, " if model.point_supports else ""
     sentence = ("Nothing prevents: {}. The loads balance, and " + chosen +
                 "the mean displacement and rotation are set to zero.")

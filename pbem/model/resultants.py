@@ -47,9 +47,11 @@ def describe_unbalance(
     return None
 
 
-def find_unbalanced_force(model: Model, motion: RigidBodyMode, moving: Sequence[Region]) -> complex:
-    """The resultant of the loads on what moves at the end of the first stage in which they drive it."""
-    for number in range(len(model.stages)):
+def find_unbalanced_force(
+    model: Model, motion: RigidBodyMode, moving: Sequence[Region], stages: Sequence[int]
+) -> complex:
+    """The resultant of the loads on what moves at the end of the first of some stages in which they drive it."""
+    for number in stages:
         force, _, power, scale = _sum_up(model, motion, moving, number, 1.0)
         if abs(power) > BALANCED * scale:
             return force

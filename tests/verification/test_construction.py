@@ -405,3 +405,34 @@ def test_a_wall_whose_load_comes_to_be_along_other_axes(tractions_first: bool, t
     sxx, syy, sxy = stress.T
     tractions = sxx * across.real + sxy * across.imag + 1j * (sxy * across.real + syy * across.imag)
     np.testing.assert_allclose(tractions, -across, atol=1e-6)
+
+
+def dig_out(steps: int, **tables: object) -> dict[str, object]:
+    """A heavy inclusion in a plane, which the second stage removes."""
+    return {
+        "materials": {"rock": {"young": 1000.0, "poisson": 0.25},
+                      "ore": {"young": 3000.0, "poisson": 0.25, "density": 1.0}},
+        "curves": {"rim": {"center": [0, 0], "radius": 1.0, "elements": 16},
+                   "hole": {"center": [5, 0], "radius": 1.0, "elements": 16}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "boundary": ["rim", "hole"]},
+                    "body": {"material": "ore", "boundary": ["rim"]}},
+        "gravity": {"gy": -1.0}, "remote": {"syy": -1.0}, "output": {"points": [[2.0, 0.5], [0.0, -1.5], [3.0, 2.0]]},
+        "stages": [{"name": "load", "steps": 1}, {"name": "dig", "steps": steps, "remove": ["body"]}], **tables,
+    }
+
+
+def test_half_of_a_heavy_inclusion_removed_from_a_plane_is_half_of_its_weight(tmp_path: Path) -> None:
+    results = pbem.run(dig_out(2), tmp_path / "dig.h5")
+    stress = results.interior.stress
+    assert len(stress) == 3
+    np.testing.assert_allclose(stress[1], 0.5 * (stress[0] + stress[2]), atol=1e-9)
+    moved = results.interior.displacement - results.interior.displacement[:, :1]
+    np.testing.assert_allclose(moved[1], 0.5 * (moved[0] + moved[2]), atol=1e-12)
+    assert not [note for note in results.notes if "balance" in note]
+
+
+def test_what_balances_the_weight_of_a_body_alone_is_refused_once_that_is_gone() -> None:
+    # Tractions on the hole carry the body: of 3.14, along its length of 6.28.
+    with pytest.raises(pbem.CaseError, match="net force on the infinite region 'plane'.*stage 'dig' drive it, with "
+                                             r"resultant \(0, 3.14159\)"):
+        pbem.run(dig_out(1, boundary={"hole": {"ty": 0.5}}))

@@ -149,16 +149,17 @@ def _find_carried_force(problem: Problem, whole: Complex, known: Complex, load: 
     fields of its own point loads; 0 if none.
 
     It is that of what acts from outside on all bodies that move with the region: weight, less that of what holes have
-    taken out of the region, point loads, and tractions on outer curves. whole, known (nodes,): tractions, and those of
-    fields in finite balance, which are minus the forces that they balance.
+    taken out of the region, point loads, and tractions on outer curves and on faces that a region has left bare. whole,
+    known (nodes,): tractions, and those of fields in finite balance, which are minus the forces that they balance.
     """
     mesh, regions = problem.mesh, problem.model.regions
     plane = next((region.name for region in regions if region.infinite), None)
-    if plane is None or not (known.any() or load.net_force):
+    bare = problem.arrangement.bare if problem.arrangement is not None else np.zeros(0, dtype=np.int64)
+    if plane is None or not (known.any() or load.net_force or whole[bare].any()):
         return 0j
     directions, powers = [], []
     outer = np.zeros(mesh.nodes, dtype=bool)
-    outer[problem.outer.node] = True
+    outer[problem.outer.node] = outer[bare] = True
     for motion in problem.plane_translations:
         direction, power = motion.velocities[plane][0], 0.0
         for number, name in enumerate(mesh.region_names):

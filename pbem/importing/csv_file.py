@@ -15,6 +15,9 @@ DELIMITERS = ",;\t|"
 # Names of columns, in small letters.
 SEGMENT = ("x1", "y1", "x2", "y2")
 IDENTITIES = ("id", "name", "trace", "fid", "trace_id", "line")
+# Columns that number the vertices of a trace, and its parts, as geographic information systems write them.
+ORDERS = ("order", "seq", "sequence", "vertex", "vertex_id", "vertex_index", "point_order")
+PARTS = ("part", "part_id", "vertex_part")
 # Words in names of columns that hold the coordinates of one axis.
 AXES = {"x": {"x", "east", "easting", "lon", "longitude"}, "y": {"y", "north", "northing", "lat", "latitude"}}
 EXPECTED = "rows x1,y1,x2,y2 or id,x,y, with or without a header that names them"
@@ -39,11 +42,17 @@ def read_csv(path: Path, text: str) -> Reading:
         reading.blame(f"line {rows[0][0]}", found, EXPECTED)
         raise fail(path, reading.faults)
     if columns is not None:
-        rows = rows[1:]
+        _tell_unread(rows[0][1], columns, reading)
+        width, rows = len(header), rows[1:]
     else:
+        width = len(rows[0][1])
         columns = {len(SEGMENT): dict(zip(SEGMENT, range(4), strict=True)), 3: {"id": 0, "x": 1, "y": 2}}[
-            len(rows[0][1])
+            width
         ]
+    for line, cells in rows:
+        if len(cells) > width:
+            # Of a decimal comma, for example.
+            reading.blame(f"line {line}", f"a row of {len(cells)}", f"{width} columns, as before")
     if "x1" in columns:
         _read_segments(rows, columns, reading)
     else:
@@ -84,8 +93,20 @@ def _read_header(names: list[str]) -> dict[str, int] | None:
         columns = {name: places[name] for name in SEGMENT}
         return columns if identity is None else {**columns, "id": identity}
     if identity is not None and "x" in places and "y" in places:
-        return {"id": identity, "x": places["x"], "y": places["y"]}
+        columns = {"id": identity, "x": places["x"], "y": places["y"]}
+        for key, known in (("order", ORDERS), ("part", PARTS)):
+            found = next((places[name] for name in known if name in places), identity)
+            if found != identity:
+                columns[key] = found
+        return columns
     return None
+
+
+def _tell_unread(names: list[str], columns: dict[str, int], reading: Reading) -> None:
+    """Say which columns are not read."""
+    others = [show(name) for number, name in enumerate(names) if number not in columns.values() and name]
+    if others:
+        reading.notes.append(f"Columns that are not read: {list_names(others)}.")
 
 
 def _agrees(names: list[str]) -> bool:
@@ -141,22 +162,28 @@ def _read_segments(rows: list[tuple[int, list[str]]], columns: dict[str, int], r
 
 
 def _read_vertices(rows: list[tuple[int, list[str]]], columns: dict[str, int], reading: Reading) -> None:
-    """Successive rows of one name are a part of its trace."""
+    """Successive rows of one name, and of one part if there is a column of these, are a part of its trace."""
     parts: dict[str, list[tuple[int, list[complex]]]] = {}
-    last = None
+    last, last_part, place = None, "", -math.inf
     for line, cells in rows:
         x, y = (_read_cell(cells, columns[key], key, line, reading) for key in ("x", "y"))
         name = cells[columns["id"]] if columns["id"] < len(cells) else ""
+        part = cells[columns["part"]] if "part" in columns and columns["part"] < len(cells) else ""
+        before = place if (name, part) == (last, last_part) else -math.inf
+        number = _read_cell(cells, columns["order"], "order", line, reading) if "order" in columns else None
+        if number is not None and number < before:
+            reading.blame(f"line {line}, order", f"{number:g} after {before:g}", "vertices in order along a trace")
+        place = before if number is None else number
         if not name or not name.isprintable():
             reading.blame(f"line {line}, id", show(name), "the name of a trace")
         if x is None or y is None:
             continue
-        if name != last:
-            if name in parts:
+        if (name, part) != (last, last_part):
+            if name in parts and name != last:
                 reading.notes.append(f"Line {line}: '{name}' comes back after another trace, as a further part of it.")
             parts.setdefault(name, []).append((line, []))
         parts[name][-1][1].append(complex(x, y))
-        last = name
+        last, last_part = name, part
     for name, pieces in parts.items():
         for line, points in pieces:
             if len(points) < 2:

@@ -186,6 +186,20 @@ def test_traces_with_names_of_pieces_of_others_have_laws_of_their_own(capsys: Ca
     assert [find_joint(model, name).law.cohesion for name in tables["curves"]] == [5, 5, 0, 0, 0, 0]
 
 
+def test_columns_that_are_not_read_are_told(capsys: Capture) -> None:
+    bring_in("map.csv", "id,x1,y1,x2,y2,aperture,note\n5,0,0,1,0,0.1,a\n6,0,1,1,1,0.2,b\n")
+    assert 'Columns that are not read: "aperture", "note".' in capsys.readouterr().out
+
+
+def test_parts_and_order_of_vertices_are_those_of_their_columns() -> None:
+    # As a geographic information system extracts the vertices of lines with several parts.
+    rows = ["1,0,0,0,0", "1,1,0,1,0", "1,2,1,2,0", "1,3,1,3,1", "2,0,0,0,5", "2,1,0,4,5"]
+    tables = bring_in("map.csv", "\n".join(["fid,vertex_index,vertex_part,x,y", *rows]))
+    assert {name: curve["points"] for name, curve in tables["curves"].items()} == {
+        "1.1": [[0, 0], [1, 0]], "1.2": [[2, 0], [3, 1]], "2": [[0, 5], [4, 5]],
+    }
+
+
 def test_traces_that_would_be_pieces_of_none_are_told_apart(capsys: Capture) -> None:
     # By what ends in a number, 1.1 and 1.2 would be the trace 1 in tables, pictures and laws.
     tables = bring_in("map.csv", "id,x1,y1,x2,y2\n1.1,0,0,2,0\n1.2,0,1,2,1\n2.10,0,2,2,2\n2.10a,0,3,2,3\n")
@@ -418,6 +432,9 @@ def test_an_arc_of_a_drawing_that_turns_by_360_degrees_is_a_circle(first: float)
     ("map.csv", "\n\n", "the file: found nothing in it"),
     ("map.csv", "a,b\n1,2\n", "line 1: found columns"),
     ("map.csv", "0,0,1,1\n0,0,1\n", "line 2, y2: found a row of 3"),
+    ("map.csv", "0,0,1,1\n0,5,1,1,2\n", "line 2: found a row of 5; expected 4 columns"),
+    ("map.csv", "id,x,y\na,0,0\na,1,5,2\n", "line 3: found a row of 4; expected 3 columns"),
+    ("map.csv", "id,order,x,y\na,1,0,0\na,3,2,0\na,2,1,1\n", "line 4, order: found 2 after 3"),
     ("map.csv", "0,0,1,x\n", "line 1, y2: found \"x\""),
     ("map.csv", "id,x,y\na,0,inf\n", "line 2, y: found \"inf\""),
     ("map.dxf", "no drawing", "the file: found what ezdxf cannot read"),

@@ -13,8 +13,8 @@ from pbem.importing.options import Imported
 
 # In this order, each with its title for one and for several, and the words of a line.
 TITLES: Mapping[Kind, tuple[str, str, str]] = {
-    "dropped": ("trace dropped, which is no longer than the snap distance",
-                "traces dropped, which are no longer than the snap distance", "{trace} at {place}: {distance} long"),
+    "dropped": ("trace dropped, of which the snap distance leaves nothing",
+                "traces dropped, of which the snap distance leaves nothing", "{trace} at {place}: {distance} long"),
     "thinned": ("vertex left out, no further than the snap distance from another one of its trace",
                 "vertices left out, no further than the snap distance from another one of their trace",
                 "{trace} at {place}: {distance} from the next"),

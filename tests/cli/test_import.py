@@ -99,7 +99,8 @@ def test_the_default_size_is_one_that_check_does_not_doubt(capsys: Capture) -> N
 def test_one_change_is_told_of_in_the_singular(capsys: Capture) -> None:
     bring_in("map.geojson", write_map([[0, 0], [2, 0]], [[1, 0.001], [1, 1]], [[5, 5], [5, 5]]), "--snap", "0.002")
     said = capsys.readouterr().out
-    for part in ("1 trace dropped, which is no longer", "1 end or vertex joined to what it all but reaches, by 0.001",
+    for part in ("1 trace dropped, of which the snap distance leaves nothing",
+                 "1 end or vertex joined to what it all but reaches, by 0.001",
                  "1 cut, where traces cross or meet: listed in"):
         assert part in said
 

@@ -138,6 +138,32 @@ def test_distances_are_told() -> None:
     assert network.pieces["b"].start == 1 and network.pieces["c"].start == 0.5
 
 
+def test_ends_that_go_on_to_a_node_are_told_by_how_far_they_went() -> None:
+    # Both come to lie on a, next to where it begins or turns, which is further away than 0.05: b from its side, c from
+    # beyond it.
+    network = cut_network(draw(a=[0, 2, 2 + 1j], b=[0.5 - 1j, 0.04 - 0.04j], c=[1.965 + 0.04j, 1.98 - 1j]), 0.05)
+    b, cut, c = (change for change in network.changes if change.kind in ("joined", "cut off"))
+    assert (b.kind, b.trace, b.place) == ("joined", "b", 0.04 - 0.04j) and network.pieces["b"].end == 0
+    assert b.distance == pytest.approx(0.04 * math.sqrt(2))
+    assert (cut.kind, cut.trace, cut.place) == ("cut off", "c", 1.965 + 0.04j) and network.pieces["c"].start == 2
+    assert (c.kind, c.trace) == ("joined", "c") and c.distance == pytest.approx(abs(2 - c.place))
+    assert cut.distance == pytest.approx(abs(c.place - cut.place)) and c.place.imag == pytest.approx(0.0, abs=1e-12)
+
+
+def test_traces_of_which_ends_are_cut_off_and_nothing_is_left_are_told_by_their_length() -> None:
+    network = cut_network(draw(a=[-1j, 1j], b=[-0.045, 0.015]), 0.05)
+    dropped = [change for change in network.changes if change.kind == "dropped"]
+    assert [(change.trace, change.place) for change in dropped] == [("b", -0.045)]
+    assert dropped[0].distance == pytest.approx(0.06) and list(network.pieces) == ["a"]
+
+
+def test_traces_are_cut_by_what_has_a_piece_there() -> None:
+    # At 1 and 2 the trace b ends, which lies on a: c is what cuts it at 1, and nothing at 2.
+    network = cut_network(draw(a=[0, 4], b=[1, 2], c=[1 - 1j, 1 + 1j]), 0.01)
+    cuts = [(change.trace, change.place, change.other) for change in network.changes if change.kind == "cut"]
+    assert sorted(cuts) == [("a", 1, "c"), ("c", 1, "a")]
+
+
 def test_a_trace_to_which_nothing_is_done_keeps_its_curve() -> None:
     traces = {**draw(a=A), "c": draw_circle("c", 5j, 1.0, DIVISION)}
     network = cut_network(traces)  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ import numpy as np
 from pbem.arrays import Complex, Integer
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.intersection import meeting_points
+from pbem.geometry.network.parts import Kind
 from pbem.geometry.network.strands import Log, Strand, collect_legs, gather, sort_places
 
 
@@ -73,6 +74,7 @@ def pull_ends(strands: list[Strand], points: Complex, snap: float, rounding: flo
     targets: dict[int, list[tuple[int, float]]] = {}
     for index in order.tolist():
         targets.setdefault(int(tip[index]), []).append((int(near[index]), float(distance[index])))
+    told: list[tuple[Kind, str, int, complex, float, str]] = []
     for node, others in targets.items():
         leg = strands[owner[own[node]]].legs[number[own[node]]]
         name = strands[owner[own[node]]].name
@@ -84,21 +86,32 @@ def pull_ends(strands: list[Strand], points: Complex, snap: float, rounding: flo
         ]
         if crossings:
             far, point, edge = max(crossings, key=lambda each: each[0])
-            log.add("cut off", name, place, far, strands[owner[edge]].name)
+            told.append(("cut off", name, node, place, far, strands[owner[edge]].name))
             moved[node] = point
         elif others[0][1] > rounding:
             edge, far = others[0]
             other = strands[owner[edge]].legs[number[edge]]
-            log.add("joined", name, place, far, strands[owner[edge]].name)
+            told.append(("joined", name, node, place, far, strands[owner[edge]].name))
             moved[node] = complex(other.point(np.array(min(1.0, max(0.0, other.project(place))))))
-    return _settle(strands, points, moved, snap)
+    target = _settle(strands, points, moved, snap)
+    for kind, name, node, place, far, onto in told:
+        # What lies next to a node of the other trace goes on to it.
+        reached = complex(moved[target[node]])
+        if kind == "joined":
+            log.add(kind, name, place, abs(reached - place), onto)
+            continue
+        log.add(kind, name, place, far, onto)
+        cut = complex(moved[node])
+        if abs(reached - cut) > rounding:
+            log.add("joined", name, cut, abs(reached - cut), onto)
+    return moved
 
 
-def _settle(strands: list[Strand], points: Complex, moved: Complex, snap: float) -> Complex:
-    """Ends that were moved next to another node become that node."""
+def _settle(strands: list[Strand], points: Complex, moved: Complex, snap: float) -> Integer:
+    """Ends that were moved next to another node become that node: the numbers of the nodes that all become."""
     which = np.flatnonzero(moved != points)
     if not len(which):
-        return points
+        return np.arange(len(points))
     used = np.unique(np.concatenate([strand.nodes for strand in strands if strand.nodes]))
     shifted = np.isin(used, which)
     joined = gather(moved[used], sort_places(moved[used], shifted), snap)
@@ -107,7 +120,7 @@ def _settle(strands: list[Strand], points: Complex, moved: Complex, snap: float)
     for strand in strands:
         if strand.legs:
             _tie(strand, target[strand.nodes].tolist(), moved, snap)
-    return moved
+    return target
 
 
 def list_nodes(strands: Sequence[Strand]) -> Integer:

@@ -65,20 +65,21 @@ def cut_network(traces: Mapping[str, Curve], snap: float = 0.0) -> Network:
     log = Log()
     strands = read_strands(traces, origin, snap, log)
     if not strands:
-        return Network({}, {}, (), (), log.resolve(origin, {}))
+        return Network({}, {}, (), (), log.resolve(origin, {}, {}))
     points = number_nodes(strands, snap, rounding, log)
     points = pull_ends(strands, points, snap, rounding, log)
-    strands = _drop_empty(strands, points, log)
+    strands = _drop_empty(traces, strands, origin, log)
     points = cut_at_nodes(strands, points, snap, rounding, log)
     runs = find_runs(strands, merge(strands, snap, log), log)
     return _compose(traces, runs, strands, points, origin, log)
 
 
-def _drop_empty(strands: Sequence[Strand], points: Complex, log: Log) -> list[Strand]:
+def _drop_empty(traces: Mapping[str, Curve], strands: Sequence[Strand], origin: complex, log: Log) -> list[Strand]:
     """Without the traces of which nothing is left but a node."""
     for strand in strands:
         if not strand.legs:
-            log.add("dropped", strand.name, complex(points[strand.nodes[0]]), 0.0, strand.nodes[0])
+            given = traces[strand.name]
+            log.add("dropped", strand.name, given.start - origin, given.length, strand.nodes[0])
     return [strand for strand in strands if strand.legs]
 
 
@@ -104,7 +105,11 @@ def _compose(
             ends = tuple((runs[number].name, not forwards) for number, forwards in steps)
             junctions.append(Junction(places[node], ends, _count_passing([runs[number].trace for number, _ in steps])))
     blocks = tuple(Block(each.rings, each.area, each.center + origin) for each in find_blocks(runs, around))
-    changes = log.resolve(origin, {node: tuple(each) for node, each in names.items()})
+    left: dict[int, dict[str, None]] = defaultdict(dict)
+    for run in runs:
+        for node in run.nodes:
+            left[node][run.trace] = None
+    changes = log.resolve(origin, names, left)
     return Network(pieces, {run.name: run.trace for run in runs}, tuple(junctions), blocks, changes)
 
 

@@ -13,7 +13,7 @@ class Change:
     """What was done to a trace at a place.
 
     kind and distance:
-      "dropped"  the whole trace, which is no longer than the distance
+      "dropped"  the whole trace, which is as long as the distance, and of which snapping leaves nothing
       "thinned"  a vertex at the distance from another one of the trace, left out
       "joined"   an end or a vertex was moved by the distance, onto `other`
       "cut off"  the end that pokes through `other` by the distance

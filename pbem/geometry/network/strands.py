@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -59,12 +59,14 @@ class Log:
     def add(self, kind: Kind, trace: str, place: complex, distance: float, other: str | int = "") -> None:
         self.entries.append((kind, trace, place, float(distance), other))
 
-    def resolve(self, origin: complex, traces_at: Mapping[int, Sequence[str]]) -> tuple[Change, ...]:
-        """traces_at: names of the traces at every node."""
+    def resolve(
+        self, origin: complex, traces_at: Mapping[int, Iterable[str]], left_at: Mapping[int, Iterable[str]]
+    ) -> tuple[Change, ...]:
+        """traces_at: names of the traces at every node; left_at: of those that have a piece there, which cut others."""
         changes = []
         for kind, trace, place, distance, other in self.entries:
             if isinstance(other, int):
-                here = traces_at.get(other, ())
+                here = (left_at if kind == "cut" else traces_at).get(other, ())
                 other = next((name for name in here if name != trace), trace)
             changes.append(Change(kind, trace, place + origin, distance, other))
         return tuple(dict.fromkeys(changes))

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError
+from pbem.results.lazy import JoinedContact
 from pbem.results.reader import Results
 from pbem.results.rigid import COMPONENTS
-from pbem.results.trace_names import find_names, name_trace
+from pbem.results.trace_names import find_names, is_piece, name_trace
 from pbem.wording import list_names, suggest
 
 Table = dict[str, NDArray[Any]]
@@ -25,8 +26,9 @@ def make_table(results: Results, what: str) -> Table:
     """The columns of a table: `steps`, `reactions`, `rigid`, `tips`, `interior`, or the contact of an interface.
 
     That is named as contact.NAME, or by NAME alone if it is none of the others; "contact" is all of them. NAME may be a
-    trace, which stands for all its pieces, or a pattern: then a column tells the interface. One row for each stored
-    step and pair, curve, tip or point. Raises ResultFileError for what the file does not hold, TypeError for no text.
+    trace, which stands for all its pieces, along which arc_length goes on, or a pattern: then a column tells the
+    interface. One row for each stored step and pair, curve, tip or point. Raises ResultFileError for what the file does
+    not hold, TypeError for no text.
     """
     if not isinstance(what, str):
         raise TypeError(f"what: found {what!r}; expected the name of a table: {list_names(list_tables(results))}")
@@ -37,7 +39,10 @@ def make_table(results: Results, what: str) -> Table:
     if name in results.contact:
         return _tabulate_contact(results, name)
     try:
-        return _tabulate_pieces(results, find_names([name], list(results.contact))[name])
+        names = find_names([name], list(results.contact))[name]
+        if all(is_piece(each, name) for each in names):
+            return _tabulate_trace(results, name)
+        return _tabulate_pieces(results, names)
     except ValueError as error:
         hint = suggest(name, [*known, *results.contact, *map(name_trace, results.contact)]) or ";"
         raise ResultFileError(str(results.path), f"has no table '{what}'{hint} it has {list_names(known)}") from error
@@ -153,6 +158,14 @@ def _tabulate_contact(results: Results, name: str) -> Table:
         **_name_steps(results, contact.pairs), **{each: _repeat(results, values) for each, values in fixed.items()},
         **{each: values.ravel() for each, values in growing.items()},
     }
+
+
+def _tabulate_trace(results: Results, trace: str) -> Table:
+    """The pieces of a trace together, step by step, in their order along it."""
+    joined = results.contact[trace]
+    assert isinstance(joined, JoinedContact)
+    table = _tabulate_pieces(results, [piece.name for piece in joined.pieces])
+    return {**table, "arc_length": _repeat(results, joined.arc_length)}
 
 
 def _tabulate_pieces(results: Results, names: Sequence[str]) -> Table:

@@ -302,6 +302,8 @@ def test_a_trace_stands_for_its_pieces(
     assert table["interface"].tolist() == 3 * names
     assert table["step"].tolist() == np.repeat([1, 2, 3], len(names)).tolist()
     assert table["x"][: len(names)].tolist() == [x for each in pieces for x in each.position[:, 0].tolist()]
+    assert table["arc_length"].tolist() == 3 * cracks.contact["t1"].arc_length.tolist()
+    assert (np.diff(table["arc_length"][: len(names)]) > 0).all()
     assert cracks.to_dataframe("t1")["pair"].tolist() == table["pair"].tolist()
     assert set(make_table(cracks, "*")["interface"]) == set(cracks.contact)
     assert main(["export", str(cracks.path), "-o", str(tmp_path / "t.csv"), "--what", "contact.t1"]) == 0

@@ -30,8 +30,8 @@ def approach_pairs(model: Model, mesh: Mesh, gap: Real) -> Real:
         at = np.flatnonzero(own & (sides == (first, second)).all(axis=1))
         names = mesh.region_names[first], mesh.region_names[second]
         rates[at] = find_rates(motions, *names, pairs.position[at], pairs.normal[at])
-    contacts = [model.contacts.get(name) for name in mesh.interface_names]
-    rough = np.array([each is not None and resists_slip(each.law) for each in contacts], dtype=bool)[pairs.interface]
+    joints = [model.contacts.get(name) or model.interfaces.get(name) for name in mesh.interface_names]
+    rough = np.array([each is not None and resists_slip(each.law) for each in joints], dtype=bool)[pairs.interface]
     moved = move_until_closed(np.maximum(gap, 0.0)[own], rates[own], power, model.size, rough[own])
     result = gap.copy()
     if moved is not None:

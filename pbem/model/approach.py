@@ -6,7 +6,7 @@ do most work. Openings are linear in small motions, so that this is a linear pro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.loop import side_legs
 from pbem.geometry.sampling import sample_side
 from pbem.linear_programme import SOLVED, minimise
-from pbem.model.model import Contact, Law, Model
+from pbem.model.model import Contact, Interface, Law, Model
 from pbem.model.resultants import measure_power
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes
 from pbem.model.sight import OVERLAP, Obstacles
@@ -32,18 +32,22 @@ ROUNDED = 1e-14
 
 
 def find_closing(model: Model) -> frozenset[str]:
-    """Contacts that do not touch at the start, and stop what the loads of a stage move otherwise freely."""
-    apart = {name: one for name, one in model.contacts.items() if one.law.kind not in ("open", "bonded")}
-    motions = find_rigid_body_modes(model) if apart else ()
+    """Contacts, and interfaces with a gap, that do not touch at the start, and stop what the loads of a stage move
+    otherwise freely."""
+    joints: list[Contact | Interface] = [*model.interfaces.values(), *model.contacts.values()]
+    apart = {one.name: one for one in joints if one.second is not None and one.law.kind not in ("open", "bonded")}
+    # Interfaces that touch everywhere hold what they hold from the start.
+    parted = any(isinstance(one, Contact) or isinstance(one.law.gap, Varying) or one.law.gap > 0
+                 for one in apart.values())
+    motions = find_rigid_body_modes(model) if parted else ()
     if not motions:
         return frozenset()
     power = find_drive(model, motions)
     if power is None:
         return frozenset()
     names, openings, rates = [], [], []
-    for name, contact in apart.items():
-        for one, other in ((contact.first, contact.second), (contact.second, contact.first)):
-            opening, rate = _sample_openings(model, contact, one, other, motions)
+    for name, joint in apart.items():
+        for opening, rate in _sample_openings(model, joint, motions):
             names += [name] * len(opening)
             openings.append(opening)
             rates.append(rate)
@@ -59,26 +63,40 @@ def find_closing(model: Model) -> frozenset[str]:
 
 
 def _sample_openings(
-    model: Model, contact: Contact, curve: str, other: str, motions: Sequence[RigidBodyMode]
-) -> tuple[Real, Real]:
-    """Openings (k,) at points of a curve that face the other one, and what motions add to them (k, c)."""
-    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
-    points, normals = sample_side(model.curves, sides[curve])
-    shorter = min(model.curves[curve].length, model.curves[other].length)
-    around = Obstacles(side_legs(model.curves, sides[other]))
-    seen = around.look_along(points, normals, -OVERLAP * shorter)
-    faced = (seen.leg >= 0) & (seen.product < 0)
-    points, normals, distance = points[faced], normals[faced], seen.distance[faced]
-    gap = contact.law.gap
-    if isinstance(gap, Varying):  # along the first curve
-        feet = [find_foot(model.curves[contact.first], complex(point)) for point in points]
-        places = Places(np.array([foot for foot, _ in feet], dtype=complex) + model.origin,
-                        np.array([along for _, along in feet]))
-        distance = distance + evaluate(gap, places)
-    else:
-        distance = distance + gap
+    model: Model, joint: Contact | Interface, motions: Sequence[RigidBodyMode]
+) -> Iterator[tuple[Real, Real]]:
+    """Openings (k,) at points of a contact's curves that face the other one, or along an interface, and what motions
+    add to them (k, c)."""
+    if isinstance(joint, Interface):
+        first = next(region for region in model.regions if region.name == joint.first)
+        side = next(side for loop in first.loops for side in loop.sides if side.curve == joint.name)
+        points, normals = sample_side(model.curves, side)
+        yield (np.maximum(_evaluate_gap(model, joint, points), 0.0),
+               find_rates(motions, joint.first, joint.second or joint.first, points, normals))
+        return
     bounded = find_bounded(model)
-    return np.maximum(distance, 0.0), find_rates(motions, bounded[curve], bounded[other], points, normals)
+    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
+    shorter = min(model.curves[name].length for name in (joint.first, joint.second))
+    for curve, other in ((joint.first, joint.second), (joint.second, joint.first)):
+        points, normals = sample_side(model.curves, sides[curve])
+        around = Obstacles(side_legs(model.curves, sides[other]))
+        seen = around.look_along(points, normals, -OVERLAP * shorter)
+        faced = (seen.leg >= 0) & (seen.product < 0)
+        points, normals = points[faced], normals[faced]
+        opening = np.maximum(seen.distance[faced] + _evaluate_gap(model, joint, points), 0.0)
+        yield opening, find_rates(motions, bounded[curve], bounded[other], points, normals)
+
+
+def _evaluate_gap(model: Model, joint: Contact | Interface, points: Complex) -> Real:
+    """The gap (k,) that is given beside the one of the geometry; one that varies does so along the (first) curve."""
+    gap = joint.law.gap
+    if not isinstance(gap, Varying):
+        return np.full(len(points), gap)
+    curve = model.curves[joint.name if isinstance(joint, Interface) else joint.first]
+    feet = [find_foot(curve, complex(point)) for point in points]
+    places = Places(np.array([foot for foot, _ in feet], dtype=complex) + model.origin,
+                    np.array([along for _, along in feet]))
+    return np.asarray(evaluate(gap, places))
 
 
 def resists_slip(law: Law) -> bool:

@@ -245,8 +245,8 @@ class Model:
 
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
-    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools. closing: contacts
-    that touch only once the loads have moved a body that nothing else holds.
+    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools. closing: contacts, and
+    interfaces with a gap, that touch only once the loads have moved a body that nothing else holds.
     interior_points: where displacement and stress are asked for, those of the grid first, x fastest, then single
     points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress of materials by name, there before any load. rest_gravity: acceleration that it is in

@@ -1,12 +1,17 @@
-"""What all tests share: starting the program on several ranks."""
+"""What all tests share: starting the program on several ranks, and leaving out errors that nobody looks at."""
 
 from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
+from pbem import driver
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.results.estimator import Estimator
 from tests.parallel.launch import launch, launch_snippet
 
 
@@ -20,3 +25,14 @@ def mpirun() -> Callable[..., subprocess.CompletedProcess[str]]:
 def mpirun_snippet() -> Callable[..., subprocess.CompletedProcess[str]]:
     """`mpirun_snippet(ranks, code, *args, timeout=..., cwd=...)` runs a piece of Python."""
     return launch_snippet
+
+
+@pytest.fixture
+def without_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs in this process have no second solution, which takes a third of a small one: for tests that look at no
+    estimated errors."""
+
+    def make_none(model: Model, mesh: Mesh, *_: Any) -> Estimator:
+        return Estimator(model, mesh, None, None, "not asked for")
+
+    monkeypatch.setattr(driver, "make_estimator", make_none)

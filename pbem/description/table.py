@@ -10,7 +10,8 @@ from pbem.description.values import Text
 class Table(BaseModel):
     """A table of the case file: frozen, and without keys beyond its own."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # Validators of tables within others are never used by themselves: building them all took a tenth of a start.
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class UnitsTable(Table):

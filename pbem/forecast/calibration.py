@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.linalg import lapack
@@ -37,7 +38,8 @@ LOOP_SECONDS = 1.46e-3
 
 
 def measure_speed(model: Model, mesh: Mesh) -> Speed:
-    """Time small samples of what a run does; the kernels are timed on the model's own elements."""
+    """Time small samples of what a run does; the kernels are timed on the model's own elements, the rest is that of the
+    machine and is timed once in a process."""
     region = int(np.bincount(mesh.node_region).argmax())
     nodes = np.flatnonzero(mesh.node_region == region)
     needed = np.ones(4 * mesh.nodes, dtype=bool)
@@ -47,15 +49,17 @@ def measure_speed(model: Model, mesh: Mesh) -> Speed:
     last = min(first + rows, mesh.nodes)
     made = assemble_rows(mesh, materials, first, last, needed, model.size)
     entries = sum(block.matrix.size for block in made.blocks)
+    (entry,) = _time([lambda: assemble_rows(mesh, materials, first, last, needed, model.size)])
+    return Speed(entry / max(entries, 1), *_measure_machine())
+
+
+@cache
+def _measure_machine() -> tuple[float, float, float]:
+    """What does not depend on the model: Speed's operation, byte and python."""
     matrix = np.asfortranarray(np.random.default_rng(1).random((FACTOR_SIZE, FACTOR_SIZE)))
     large, vector = np.ones((PRODUCT_SIZE, PRODUCT_SIZE)), np.ones(PRODUCT_SIZE)
-    entry, factor, product, loop = _time([
-        lambda: assemble_rows(mesh, materials, first, last, needed, model.size), lambda: lapack.dgetrf(matrix),
-        lambda: large @ vector, _loop,
-    ])  # fmt: skip
-    return Speed(
-        entry / max(entries, 1), factor / (2 / 3 * FACTOR_SIZE**3), product / large.nbytes, loop / LOOP_SECONDS
-    )
+    factor, product, loop = _time([lambda: lapack.dgetrf(matrix), lambda: large @ vector, _loop])
+    return factor / (2 / 3 * FACTOR_SIZE**3), product / large.nbytes, loop / LOOP_SECONDS
 
 
 def _loop() -> int:

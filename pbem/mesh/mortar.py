@@ -12,11 +12,12 @@ and its tractions oscillate there (12 % at a ratio of 1:5 where the coarser slav
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.carrier import measure_distances
 from pbem.geometry.elements import Elements
 from pbem.geometry.tolerance import TIE
@@ -36,6 +37,8 @@ OVERLAP = 0.01
 CLEAR = 0.1 * (1 + TIE)
 # Elements that share less than this part of the shorter one are neighbours of those that face each other.
 SLIVER = 1e-3
+# Elements of the slave times those of the master that are looked at together: some MB of arrays.
+TOGETHER = 2**14
 
 
 @dataclass(frozen=True)
@@ -65,44 +68,27 @@ def couple_curves(one: Chain, other: Chain, others: Elements, overlap: float = 0
     one: the slave; other: the master. others: elements that hide the master where they stand in between; the slave's
     and the master's may be among them. overlap: how far behind the slave the master may lie (length).
     """
-    slave, master, local = one.elements, other.elements, one.local
-    shapes, rounding = interpolate_shapes(local), find_rounding(slave, master)
-    count = len(local)
+    slave, local = one.elements, one.local
+    shapes, own_weight, count = interpolate_shapes(local), weigh_nodes(slave, local), len(local)
     cover, distance = np.zeros(slave.count * count), np.zeros(slave.count * count)
-    own_weight, own_length, length = weigh_nodes(slave, local), slave.lengths, master.lengths
     nodes: list[Integer] = []
     faces: list[Integer] = []
     product: list[Real] = []
     turn: list[Complex] = []
     met: list[tuple[int, int, float]] = []
-    for element in range(slave.count):
-        single = slave.select(np.array([element]))
-        s, weight = _divide_element(single, master)
-        x, n = single.place(s)[0], single.normals(s)[0]
-        behind = np.maximum(OVERLAP * np.minimum(length, own_length[element]), overlap)
-        seen = project_nodes(x, n, master, behind)
-        hit = seen.element >= 0
-        away = np.flatnonzero(hit & (seen.distance > CLEAR * own_length[element]))
-        if len(away):
-            hit[away] = ~find_hidden(x[away], n[away], seen.distance[away], others)
-        apart = measure_distances(
-            x[hit], n[hit], one.carriers.select(np.full(int(hit.sum()), element)),
-            other.carriers.select(seen.element[hit]), seen.distance[hit], rounding,
-        )
-        stretched = weight * single.stretch(s)[0]
-        mine = (s[:, None] ** np.arange(count) @ shapes)[hit] * stretched[hit, None]
+    for element, seen in _look_across(one, other, others, overlap):
+        mine = (seen.s[:, None] ** np.arange(count) @ shapes)[seen.hit] * seen.stretched[:, None]
         own = element * count + np.arange(count)
         cover[own] = mine.sum(axis=0) / own_weight[element]
-        distance[own] = (mine * apart[:, None]).sum(axis=0) / own_weight[element]
-        theirs = seen.local[hit][:, None] ** np.arange(count) @ shapes
-        both = n[hit] + master.select(seen.element[hit]).normals(seen.local[hit, None])[:, 0]
-        for facing in np.unique(seen.element[hit]):
-            at = seen.element[hit] == facing
+        distance[own] = (mine * seen.apart[:, None]).sum(axis=0) / own_weight[element]
+        theirs = seen.local[:, None] ** np.arange(count) @ shapes
+        for facing in np.unique(seen.facing):
+            at = seen.facing == facing
             nodes.append(np.repeat(own, count))
             faces.append(np.tile(facing * count + np.arange(count), count))
             product.append((mine[at].T @ theirs[at]).ravel())
-            turn.append(((mine[at].T * both[at]) @ theirs[at]).ravel())
-            met.append((element, int(facing), float(stretched[hit][at].sum())))
+            turn.append(((mine[at].T * seen.both[at]) @ theirs[at]).ravel())
+            met.append((element, int(facing), float(seen.stretched[at].sum())))
     none = np.zeros(0)
     return Coupling(
         cover=cover,
@@ -115,6 +101,55 @@ def couple_curves(one: Chain, other: Chain, others: Elements, overlap: float = 0
         master_element=np.array([each[1] for each in met], dtype=np.int64),
         shared=np.array([each[2] for each in met], dtype=float),
     )
+
+
+@dataclass(frozen=True)
+class _Sight:
+    """What the Gauss points of an element of the slave see: s (g,) of all of them, which (g,) see the master; of these
+    (h,) the element they see, s there, the distance, their weights times lengths, the sum of both outward normals."""
+
+    s: Real
+    hit: Bool
+    facing: Integer
+    local: Real
+    apart: Real
+    stretched: Real
+    both: Complex
+
+
+def _look_across(one: Chain, other: Chain, others: Elements, overlap: float) -> Iterator[tuple[int, _Sight]]:
+    """What each element of the slave sees of the master; of many elements at a time, as they have few points each."""
+    slave, master = one.elements, other.elements
+    rounding, own_length, length = find_rounding(slave, master), slave.lengths, master.lengths
+    ends = np.unique(np.concatenate([master.start, master.end]))
+    many = max(1, TOGETHER // max(1, master.count))
+    for first in range(0, slave.count, many):
+        some = np.arange(first, min(first + many, slave.count))
+        divided = [_divide_element(cuts) for cuts in slave.select(some).locate(ends)]
+        sizes = [len(s) for s, _ in divided]
+        s, weight = (np.concatenate(each) for each in zip(*divided, strict=True))
+        element = np.repeat(some, sizes)
+        own = slave.select(element)
+        x, n = own.place(s[:, None])[:, 0], own.normals(s[:, None])[:, 0]
+        behind = np.maximum(OVERLAP * np.minimum(length, own_length[some, None]), overlap)
+        seen = project_nodes(x, n, master, behind, element - first)
+        hit = seen.element >= 0
+        away = np.flatnonzero(hit & (seen.distance > CLEAR * own_length[element]))
+        if len(away):
+            hit[away] = ~find_hidden(x[away], n[away], seen.distance[away], others)
+        facing = seen.element[hit]
+        found = (
+            facing, seen.local[hit],
+            measure_distances(x[hit], n[hit], one.carriers.select(element[hit]), other.carriers.select(facing),
+                              seen.distance[hit], rounding),
+            (weight * own.stretch(s[:, None])[:, 0])[hit],
+            n[hit] + master.select(facing).normals(seen.local[hit, None])[:, 0],
+        )  # fmt: skip
+        starts = np.cumsum(sizes)[:-1]
+        of_each = [np.split(s, starts), np.split(hit, starts)]
+        of_each += [np.split(each, np.cumsum(hit)[starts - 1]) for each in found]
+        for number, parts in zip(some, zip(*of_each, strict=True), strict=True):
+            yield int(number), _Sight(*parts)
 
 
 def find_rounding(*sides: Elements) -> float:
@@ -132,10 +167,8 @@ def measure_contrast(coupling: Coupling, slave: Elements, master: Elements) -> t
     return float((other / own)[real].max()), float((own / other)[real].max())
 
 
-def _divide_element(single: Elements, other: Elements) -> tuple[Real, Real]:
+def _divide_element(cuts: Real) -> tuple[Real, Real]:
     """Gauss points and weights on [-1, 1], cut where the normal passes the ends of the other curve's elements."""
-    ends = np.unique(np.concatenate([other.start, other.end]))
-    cuts = single.locate(ends)[0]
     inside = np.sort(cuts[np.abs(cuts) < 1 - 1e-12])
     borders = np.concatenate([[-1.0], inside, [1.0]])
     half, middle = 0.5 * np.diff(borders)[:, None], 0.5 * (borders[1:] + borders[:-1])[:, None]

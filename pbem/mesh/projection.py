@@ -28,12 +28,17 @@ class Projection:
     distance: Real
 
 
-def project_nodes(position: Complex, normal: Complex, elements: Elements, overlap: Real) -> Projection:
+def project_nodes(
+    position: Complex, normal: Complex, elements: Elements, overlap: Real, own: Integer | None = None
+) -> Projection:
     """The nearest crossing of every point's normal with elements that face it.
 
-    position, normal (k,): complex. Crossings with element j farther than overlap[j] (m,) behind do not count.
+    position, normal (k,): complex. Crossings with element j farther than overlap[j] (m,) behind do not count; with
+    own (k,) than overlap[own, j] (n, m).
     """
-    found = [_project(position[part], normal[part], elements, overlap) for part in _divide(len(position), elements)]
+    rows = np.zeros(len(position), dtype=np.int64) if own is None else own
+    found = [_project(position[part], normal[part], elements, np.atleast_2d(overlap), rows[part])
+             for part in _divide(len(position), elements)]
     return Projection(*(np.concatenate([getattr(each, name) for each in found])
                         for name in ("element", "local", "distance")))
 
@@ -59,15 +64,15 @@ def _find_passed(position: Complex, normal: Complex, elements: Elements) -> Inte
     return np.flatnonzero(abs((np.conj(along) * away).imag) <= reach + OVERSHOOT * abs(away))
 
 
-def _project(position: Complex, normal: Complex, elements: Elements, overlap: Real) -> Projection:
+def _project(position: Complex, normal: Complex, elements: Elements, overlap: Real, own: Integer) -> Projection:
     passed = _find_passed(position, normal, elements)
     if not len(passed) or not len(position):
         nothing = np.zeros(len(position))
         return Projection(np.full(len(position), -1), nothing, nothing)
-    elements, overlap = elements.select(passed), overlap[passed]
+    elements, behind = elements.select(passed), overlap[:, passed][own]
     distance, local, facing = (each.swapaxes(0, 1) for each in elements.cross(position, normal))
     crossings = distance.shape[2]
-    inside = (np.abs(local) <= 1 + OVERSHOOT) & facing & (distance >= -overlap[:, None])
+    inside = (np.abs(local) <= 1 + OVERSHOOT) & facing & (distance >= -behind[..., None])
     distance = np.where(inside, distance, np.inf).reshape(len(position), -1)
     local = local.reshape(distance.shape)
     # Where two elements meet both may be seen, at distances that rounding tells apart: the point is on one of them.

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import csv
+import fcntl
+import os
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
+import pbem
 from pbem.results.reader import Results
 
 FOLDER = Path(__file__).parents[2] / "cases"
@@ -20,6 +25,25 @@ CLEARANCE = 0.02
 
 # solve(name) gives the results of a bundled case, which is computed when it is first asked for.
 Solve = Callable[[str], Results]
+
+
+def solve_together(tmp_path_factory: pytest.TempPathFactory) -> Solve:
+    """A `Solve` whose results are in a folder that all processes of this run of the tests share."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "bundled_cases"
+    folder.mkdir(exist_ok=True)
+
+    @cache
+    def solve(name: str) -> Results:
+        path, finished = folder / f"{name}.h5", folder / f"{name}.finished"
+        with (folder / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not finished.exists():
+                pbem.run(CASES[name], path, force=True)
+                finished.touch()
+        return pbem.open_results(path)
+
+    return solve
 
 
 def read_reference(name: str) -> dict[str, dict[str, NDArray[np.float64]]]:

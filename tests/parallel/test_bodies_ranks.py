@@ -13,12 +13,16 @@ LAYERS = write_layers(0.2)
 SHORT = LAYERS.replace("elements = 24", "elements = 18")
 
 
-@pytest.mark.parametrize("text", [write_wall(0.25), SHORT], ids=["wall", "layers"])
-def test_statuses_and_products_are_the_same_on_all_ranks(text: str, tmp_path: Path, mpirun: Launch) -> None:
-    expect_same_search(run_hierarchical(mpirun, tmp_path, text, (1, 2, 3)))
+@pytest.mark.parametrize(("text", "ranks"), [(write_wall(0.25), 2), (SHORT, 3)], ids=["wall", "layers"])
+def test_statuses_and_products_are_the_same_on_all_ranks(
+    text: str, ranks: int, tmp_path: Path, mpirun_snippet: Launch
+) -> None:
+    expect_same_search(run_hierarchical(mpirun_snippet, tmp_path, text, (1, ranks)))
 
 
-def test_groups_in_the_place_of_the_factors_take_the_same_search_on_all_ranks(tmp_path: Path, mpirun: Launch) -> None:
-    results = run_hierarchical(mpirun, tmp_path, LAYERS, (1, 3), "-pbem_newton_bodies", "0")
+def test_groups_in_the_place_of_the_factors_take_the_same_search_on_all_ranks(
+    tmp_path: Path, mpirun_snippet: Launch
+) -> None:
+    results = run_hierarchical(mpirun_snippet, tmp_path, LAYERS, (1, 2), "-pbem_newton_bodies", "0")
     expect_same_search(results)
     assert results[0].convergence["products"].sum() > 40  # factors take 24

@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+import pbem
 from tests.parallel.launch import launch, launch_python
 from tests.parallel.test_ranks import read_results
 from tests.parallel.test_resume import STOPPING
@@ -38,8 +39,7 @@ operator = "dense"
 def test_two_ranks_and_a_resumed_run_give_the_same(tmp_path: Path) -> None:
     case, whole, resumed = tmp_path / "case.toml", tmp_path / "whole.h5", tmp_path / "resumed.h5"
     case.write_text(CASE)
-    run = launch(1, "run", case, "-o", whole)
-    assert run.returncode == 0, run.stderr
+    pbem.run(case, whole)
     other = ("--set", "solver.operator=hierarchical")
     stopped = launch_python(2, "-c", STOPPING, "fail", "3", "run", case, *other, "-o", resumed)
     assert stopped.returncode == 3, stopped.stderr

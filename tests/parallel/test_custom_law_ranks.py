@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import pbem
+from pbem.cli import main
 from pbem.results.reader import open_results
 from tests.cli.cli_sample import BLOCKS
 from tests.parallel.launch import launch
@@ -61,10 +62,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("what", "ranks"),
-    [("not finite", 1), ("exits", 1), ("ends the process", 1), *((what, 2) for what in WRONG)],
-)
+@pytest.mark.parametrize(("what", "ranks"), [("ends the process", 1), *((what, 2) for what in WRONG)])
 def test_a_law_that_goes_wrong_ends_all_ranks(what: str, ranks: int, folder: Path) -> None:
     change, said = WRONG[what]
     (folder / "law.py").write_text(LAW.replace("CHANGE", change))
@@ -98,9 +96,8 @@ def test_the_text_of_a_law_is_stored_and_compared(folder: Path) -> None:
     np.testing.assert_allclose(whole.traction, pbem.run(coulomb, folder / "coulomb.h5").traction, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
-def test_a_law_that_is_right_runs_on_two_ranks(operator: str, folder: Path) -> None:
-    done = launch(2, "run", "case.toml", "--quiet", "--set", f"solver.operator={operator}", cwd=folder)
+def test_a_law_that_is_right_runs_on_two_ranks_with_the_hierarchical_operator(folder: Path) -> None:
+    done = launch(2, "run", "case.toml", "--quiet", "--set", "solver.operator=hierarchical", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert open_results(folder / "case.h5").status == "finished"
 
@@ -129,23 +126,28 @@ def test_bonds_of_a_custom_law_fail_alike_on_two_ranks(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("change", "said", "ranks"), [
-    ("friction = friction * (1 + 0.1 * calls)", "bound = 0.00022, then 0.00024", 1),
     ("friction = friction * (1 + 0.1 * calls)", "bound = 0.00022, then 0.00024", 2),
     ("friction = friction * (1 + 0.1 * calls * (slip > 1e-3))", "bound = 0.00022, then 0.00024", 1),
     ("friction = friction * (1 + 0.1 * calls * (p_n < -10))", "bound = 220, then 240", 1),
 ])  # fmt: skip
 def test_a_law_that_is_no_function_of_its_arguments_is_a_fault(
-    change: str, said: str, ranks: int, folder: Path
-) -> None:
+    change: str, said: str, ranks: int, folder: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
     """Its search ended as "mode cycle", with the advice to take shorter elements."""
     (folder / "law.py").write_text(LAW.replace("CHANGE", change))
-    done = launch(ranks, "run", "case.toml", "--quiet", cwd=folder)
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.count(f"the law law.py answers differently when it is asked again: {said}") == 1, done.stderr
-    assert "interfaces.joint.file" in done.stderr and not (folder / "case.h5").exists()
+    if ranks == 1:
+        monkeypatch.chdir(folder)
+        code, told = main(["run", "case.toml", "--quiet"]), capsys.readouterr().err
+    else:
+        done = launch(ranks, "run", "case.toml", "--quiet", cwd=folder)
+        code, told = done.returncode, done.stderr
+    assert code == 2, told
+    assert told.count(f"the law law.py answers differently when it is asked again: {said}") == 1, told
+    assert "interfaces.joint.file" in told and not (folder / "case.h5").exists()
 
 
 def test_a_law_that_fails_far_from_what_it_is_made_for_is_none(folder: Path) -> None:
     change = "if p_n.min() < -500 or slip.max() > 0.5: raise ValueError('too much')"
     (folder / "law.py").write_text(LAW.replace("CHANGE", change))
-    assert launch(1, "run", "case.toml", "--quiet", cwd=folder).returncode == 0
+    assert pbem.run(folder / "case.toml", folder / "case.h5").status == "finished"

@@ -66,7 +66,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return launch_all(tmp_path_factory.mktemp("ranks_1"), 1)
 
 
-@pytest.mark.parametrize(("ranks", "names"), [(2, NAMES[::2]), (3, NAMES)])
+@pytest.mark.parametrize(("ranks", "names"), [(2, NAMES[::2]), (3, (*NAMES[1::2], "one crack"))])
 def test_ranks_do_not_change_the_results(ranks: int, names: Sequence[str], alone: Path, tmp_path: Path) -> None:
     launch_all(tmp_path, ranks, names)
     paths = sorted(path.name for path in tmp_path.glob("*.h5"))

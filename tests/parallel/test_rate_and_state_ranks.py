@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+import pbem
 from pbem.results.reader import open_results
 from tests.parallel.launch import launch, launch_python
 from tests.parallel.test_ranks import read_results
@@ -52,8 +53,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The case, with its results on one rank beside it."""
     path = tmp_path_factory.mktemp("fault") / "case.toml"
     path.write_text(CASE)
-    run = launch(1, "run", path, "-o", path.with_suffix(".h5"))
-    assert run.returncode == 0, run.stderr
+    pbem.run(path, path.with_suffix(".h5"))
     return path
 
 
@@ -104,6 +104,5 @@ def test_a_run_that_fails_half_way_is_resumed_alike_on_other_ranks(case: Path) -
     assert stopped.returncode == 3, stopped.stderr
     with h5py.File(path) as file:
         assert len(file["steps/factor"]) == 2
-    resumed = launch(1, "run", case, "-o", path, "--resume")
-    assert resumed.returncode == 0, resumed.stderr
+    pbem.run(case, path, resume=True)
     compare(case.with_suffix(".h5"), path)

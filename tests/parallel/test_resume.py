@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -127,7 +128,7 @@ def test_the_history_has_friction_in_both_directions(whole: Results) -> None:
 # In the midst of pressing, on reversal, after it, between two stages.
 @pytest.mark.parametrize(
     ("how", "number", "before", "after"),
-    [("kill", 2, 1, 2), ("kill", 6, 2, 1), ("fail", 8, 2, 3), ("fail", 10, 3, 1), ("kill", 1, 2, 2)],
+    [("kill", 2, 1, 2), ("kill", 6, 2, 1), ("fail", 8, 1, 3), ("fail", 10, 2, 1), ("kill", 1, 1, 2)],
 )
 def test_a_stopped_run_is_resumed_on_other_ranks(
     how: str, number: int, before: int, after: int, folder: Path, whole: Results, mpirun: Launch, mpirun_snippet: Launch
@@ -153,7 +154,7 @@ def test_a_run_can_be_stopped_again_and_again(folder: Path, whole: Results, mpir
 
 
 def test_a_finished_run_is_left_as_it_is(folder: Path, whole: Results, mpirun: Launch) -> None:
-    assert mpirun(1, "run", "case.toml", "--quiet", cwd=folder).returncode == 0
+    shutil.copy(whole.path, folder / "case.h5")
     done = mpirun(2, "run", "case.toml", "--resume", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert f"finished: {STEPS} steps" in done.stdout

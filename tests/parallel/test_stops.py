@@ -77,7 +77,7 @@ def test_killed_runs_are_resumed_and_end_alike(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "ranks", "rank"),
-    [("SIGTERM", 1, 0), ("SIGHUP", 1, 0), ("SIGTERM", 2, 1), ("SIGINT", 2, 0), ("SIGHUP", 3, 2)],
+    [("SIGTERM", 1, 0), ("SIGTERM", 2, 1), ("SIGINT", 2, 0), ("SIGHUP", 3, 2)],
 )
 def test_a_signal_to_one_rank_stops_all_with_one_message(
     name: str, ranks: int, rank: int, folder: Path, whole: Results

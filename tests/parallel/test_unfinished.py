@@ -105,6 +105,7 @@ class Stopping(SilentReporter):
             os.kill(os.getpid(), signal.SIGUSR1)
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("operator", ["dense", "hierarchical"])
 def test_no_iteration_is_made_twice(operator: str, tmp_path: Path) -> None:
     """The resumed search is where it was: the iterations in the file are those of a run left alone, one by one."""
@@ -112,12 +113,14 @@ def test_no_iteration_is_made_twice(operator: str, tmp_path: Path) -> None:
     expect_no_iteration_twice(tmp_path, operator)
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_pairs_that_run_on_know_what_they_were(tmp_path: Path) -> None:
     """Friction that weakens: groups that ran on grow by those that changed before the run was stopped."""
     (tmp_path / "case.toml").write_text(WEAKENING_INCLUSIONS)
     expect_no_iteration_twice(tmp_path, "dense")
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_clusters_settle_after_a_run_is_resumed_too(
     many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -155,6 +158,7 @@ def expect_no_iteration_twice(folder: Path, operator: str, last: int | None = No
             np.testing.assert_array_equal(results.convergence[name], whole.convergence[name])
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(("one", "other"), [("dense", "hierarchical"), ("hierarchical", "dense")])
 def test_a_search_goes_on_with_another_operator(one: str, other: str, tmp_path: Path, whole: Results) -> None:
     """Of the search only the modes are of use then: the step begins with them."""

@@ -295,3 +295,14 @@ def test_samples_are_repeated_until_two_of_them_are_alike(
     monkeypatch.setattr(calibration.time, "process_time", lambda: now[0])
     assert calibration._time([act]) == [best]
     assert len(done) == calls
+
+
+def test_the_machine_is_timed_once_in_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernels are timed for each model; factors, products and Python itself do not depend on it."""
+    model = parse_model(BLOCKS)[1]
+    mesh, timed, time_actions = generate_mesh(model), [], calibration._time
+    first = calibration.measure_speed(model, mesh)
+    monkeypatch.setattr(calibration, "_time", lambda actions: timed.append(len(actions)) or time_actions(actions))
+    again = calibration.measure_speed(model, mesh)
+    assert timed == [1] and first.entry > 0 and again.entry > 0
+    assert (again.operation, again.byte, again.python) == (first.operation, first.byte, first.python)

@@ -20,6 +20,8 @@ from pbem.solve.steps.former_pass import FormerPass
 from pbem.solve.system.assembly import assemble_problem
 from tests.verification.rigid_sample import find_persson_force, write_pin
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 
 class Counter(SilentReporter):
     """Iterations of each pass."""

@@ -20,6 +20,8 @@ from tests.identities.solving import linearise_pairs
 from tests.unit.test_nearby import draw_modes
 from tests.unit.test_sweeps import assemble, write_network
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Real = NDArray[np.float64]
 
 

@@ -27,6 +27,8 @@ from tests.cli.cli_sample import BLOCKS
 from tests.identities.solving import linearise_pairs
 from tests.unit.far_sample import CRACKS, TEXTS, shrink_leaves
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # Cracks with fluid, of a load history that opens, closes and shears them.
 PRESSED = CRACKS.replace("[analysis]\nsteps = 2\n", "").replace("count = 16", "count = 9\npressure = 0.8") + """
 [[stages]]

@@ -14,6 +14,8 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import Parts, find_parts
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 PLATE = """
 materials.m = {{ young = 1000.0, poisson = 0.2 }}
 curves.bottom = {{ points = [[0, 0], [2, 0]], elements = 8 }}

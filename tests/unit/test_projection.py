@@ -7,8 +7,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.geometry.elements import Elements
-from pbem.mesh import projection
+from pbem.mesh import mortar, projection
+from pbem.mesh.generate import generate_mesh
 from pbem.mesh.projection import find_hidden, project_nodes
 
 
@@ -77,3 +79,34 @@ def test_elements_that_no_normal_passes_change_nothing(
     assert len(np.unique(whole[0].element)) > 50 and 0 < np.count_nonzero(whole[1]) < 300
     nothing = np.zeros(0, dtype=complex)
     assert not len(project_nodes(nothing, nothing, faces, overlap).element)
+
+
+ROUND = """
+materials.m = { young = 1e3, poisson = 0.3 }
+curves.rim = { center = [3, 1], radius = 1, elements = 9 }
+curves.hole = { center = [3, 1], radius = 1.01, elements = 13 }
+curves.edge = { points = [[0, -2], [6, -2], [6, 4], [0, 4], [0, -2]], elements = 8 }
+curves.hub = { center = [3, 1], radius = 0.2, elements = 8 }
+regions.plate = { material = "m", boundary = ["hole", "edge"] }
+regions.pin = { material = "m", boundary = ["rim", "hub"] }
+boundary.edge = { ux = 0.0, uy = 0.0 }
+boundary.hub = { ux = 0.0, uy = -0.01 }
+contacts.seat = { between = ["rim", "hole"] }
+"""
+
+
+def test_what_faces_couple_does_not_depend_on_how_many_elements_are_looked_at_together(
+    monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = parse_model(ROUND)[1]
+    found = []
+    for most in (10**6, 40, 1):
+        monkeypatch.setattr(mortar, "TOGETHER", most)
+        pairs = generate_mesh(model).pairs
+        found.append({name: values for name, values in vars(pairs).items() if isinstance(values, np.ndarray)})
+    assert len(found[0]) > 5 and len(found[0]["weight"]) == 27
+    # All around, the nodes' weights are the whole circle of the pin.
+    assert found[0]["weight"].sum() == pytest.approx(2 * np.pi, rel=1e-6)
+    for other in found[1:]:
+        for name, values in found[0].items():
+            np.testing.assert_array_equal(other[name], values, err_msg=name)

@@ -16,6 +16,8 @@ from pbem.parallel import world
 from pbem.solve.problem.problem import Problem
 from pbem.solve.system.assembly import assemble_problem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # A disc that fits tightly into a plate that is pulled: it touches along two arcs, on which it can slide round.
 DISC = """
 [materials]

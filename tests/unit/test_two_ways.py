@@ -11,6 +11,8 @@ import pbem
 from tests.unit.far_sample import CRACKS
 from tests.unit.test_krylov import PRESSED, many_groups  # noqa: F401
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # Between two solutions this may be twice.
 NEAR = 4e-10
 

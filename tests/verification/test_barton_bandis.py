@@ -11,6 +11,8 @@ import pytest
 import pbem
 from pbem.results.reader import Results
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # Two blocks, one on the other, of the width 1.5 and the height 1 each (Poisson's ratio 0). The shear stress on their
 # sides makes the stress uniform where the joint slides.
 ANGLE, JRC, JCS, YOUNG = 26.0, 11.0, 80.0, 2e4

@@ -11,6 +11,8 @@ import pytest
 import pbem
 from pbem.solve.nonlinear import cascade, newton
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # A plate that a bonded fault cuts in two, sheared until the bond unzips; a gap in the bond's strength where it begins.
 PLATE = """
 materials.rock = { young = 1e3, poisson = 0.2 }

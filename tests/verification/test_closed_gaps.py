@@ -20,6 +20,8 @@ from pbem.solve.steps.closed_gaps import find_closed_gap
 from pbem.solve.steps.passing import Passing
 from tests.verification.test_open_faces import DEPTH, SilentReporter
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 
 class Noting(SilentReporter):
     """Keeps what a step is told of sides."""

@@ -23,6 +23,8 @@ from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 from tests.unit.case_sample import build
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # Two blocks, one on the other; a turn and other units change nothing.
 BLOCKS = """
 title = "Two blocks"

@@ -35,6 +35,7 @@ def write(path: Path, *given: Any, **analysis: Any) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(
     ("clearance", "elements", "half_width", "direction", "scheme", "place"),
     [
@@ -58,6 +59,7 @@ def test_pressures_of_a_pin_at_all_pairs(
     assert worst[1] < 1e-2 < worst[0]
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(
     ("clearance", "elements", "half_width", "scheme", "order"),
     [(3e-6, 24, 69.3, "DBEM", 1), (2e-4, 24, 39.8, "HST", 2), (3e-5, 32, 12.0, "SST", 2), (7e-3, 48, 78.0, "THST", 3)],
@@ -72,6 +74,7 @@ def test_pressures_of_a_pin_as_the_file_says_nothing_of_ends(
     assert np.abs(compare_pressures(results, force, width, 200.0)).max() < 1e-2
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_a_large_model_is_solved_again_only_if_that_is_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,6 +95,7 @@ def test_a_large_model_is_solved_again_only_if_that_is_asked_for(
     assert found is not None and "the run took 401 iterations" in found.note
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_contact_of_round_bodies_ends_as_wide_as_their_pressures_say(tmp_path: Path) -> None:
     """Two rounds pressed together by P: p = p0 sqrt(1 - (x/a)^2) with P = pi a p0 / 2 (Hertz). As bodies are no
     half-planes, a and p0 are those of the line through p^2 over x^2."""
@@ -218,8 +222,10 @@ def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
     assert not list(tmp_path.glob("pin.h5?*"))
 
 
-@pytest.mark.parametrize("ending", [StopError("SIGTERM", "stopped by SIGTERM", 143), MemoryError("no room")])
-@pytest.mark.parametrize("place", ["march", "assemble_problem", "check_memory"])
+@pytest.mark.parametrize(("place", "ending"), [
+    ("march", StopError("SIGTERM", "stopped by SIGTERM", 143)), ("march", MemoryError("no room")),
+    ("assemble_problem", StopError("SIGTERM", "stopped by SIGTERM", 143)), ("check_memory", MemoryError("no room")),
+])  # fmt: skip
 def test_finished_steps_are_stored_when_the_graded_mesh_comes_to_no_end(
     ending: Exception, place: str, plain: Results, whole: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -251,7 +257,7 @@ def test_finished_steps_are_stored_when_the_graded_mesh_comes_to_no_end(
 @pytest.mark.parametrize(
     ("place", "due", "stored"),
     [("solve_step", 2, 1), ("solve_step", 1, 0), ("find_ends", 2, 1), ("plan_graded", 1, 2), ("make_estimator", 1, 2),
-     ("estimate", 1, 2), ("estimate", 2, 2)],
+     ("estimate", 2, 2)],
 )
 def test_steps_that_wait_are_stored_when_memory_runs_out(
     place: str, due: int, stored: int, plain: Results, whole: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -300,7 +306,7 @@ def test_only_the_last_pass_is_stored_with_its_errors(tmp_path: Path, monkeypatc
     assert np.isfinite(np.asarray(results.errors.relative["tractions"])).all()
 
 
-@pytest.mark.parametrize("most", [0, 1, 5])
+@pytest.mark.parametrize("most", [1, 5])
 def test_steps_that_waited_are_those_of_a_run_that_did_not(
     most: int, whole: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -331,6 +337,7 @@ def test_steps_that_waited_are_those_of_a_run_that_did_not(
                                atol=1e-6 * size)
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("graded", [True, "auto"])
 def test_rows_of_a_sweep_are_those_of_single_runs(tmp_path: Path, graded: bool | str) -> None:
     """With "auto" of runs on the mesh that the cases share: each case for itself took sixteen times as long."""
@@ -343,6 +350,7 @@ def test_rows_of_a_sweep_are_those_of_single_runs(tmp_path: Path, graded: bool |
         assert found == pytest.approx(least, rel=1e-9)
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(("graded", "degrees"), [(True, 0.1), ("auto", 4.0)])
 def test_ends_on_a_curve_of_two_regions_are_graded_if_asked_for(
     graded: bool | str, degrees: float, tmp_path: Path
@@ -363,6 +371,7 @@ def test_ends_on_a_curve_of_two_regions_are_graded_if_asked_for(
     assert (beside.max() > 19.0) == (graded is True)
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_curves_whose_grading_is_given_are_left_alone(tmp_path: Path) -> None:
     text = write_small(tmp_path / "own.toml").read_text().replace("elements = 32", 'elements = 32, grading = "none"')
     (tmp_path / "own.toml").write_text(text)
@@ -371,6 +380,7 @@ def test_curves_whose_grading_is_given_are_left_alone(tmp_path: Path) -> None:
     assert results.fractions is None
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_an_end_that_the_openings_do_not_tell_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # As if the faces beyond parted alike everywhere.
     monkeypatch.setattr("pbem.results.contact_ends.np.polyfit", lambda *_: (0.0, 1.0))
@@ -424,6 +434,7 @@ def test_grading_is_refused_beside_accuracy() -> None:
         parse_model(write_pin(1e-3, FORCE, 20.0, 32, grade_contact_ends=True, accuracy=1e-2))
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(("half_width", "again"), [(60.0, False), (60.8, True), (61.2, False), (62.0, True)])
 def test_pressures_that_lie_on_the_root_as_they_are_are_not_solved_for_again(
     tmp_path: Path, half_width: float, again: bool
@@ -456,6 +467,7 @@ def test_a_listener_that_fails_after_a_step_was_stored_does_not_have_it_stored_a
     assert not kept.errors.missing
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(("followed", "graded", "count"), [
     ([True, True], "auto", 0), ([True, False], "auto", 2), ([False, False], "auto", 2), ([True, True], True, 2),
 ])  # fmt: skip

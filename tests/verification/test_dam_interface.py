@@ -15,6 +15,8 @@ import pytest
 
 import pbem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 GRAVITY, DENSITY, LEVEL, HEIGHT, BASE, CREST = 9.81, 2.4, 36.0, 40.0, 32.0, 5.0
 WEIGHT = GRAVITY * DENSITY * (CREST * HEIGHT + (BASE - CREST) * (HEIGHT - 4) / 2)
 THRUST = GRAVITY * LEVEL**2 / 2

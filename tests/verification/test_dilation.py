@@ -14,6 +14,8 @@ import pytest
 import pbem
 from tests.verification.dilating_sample import SIDES, YOUNG, Sheared, make_case, predict
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 FRICTION, ANGLE = 0.6, 12.0
 CLIMB = math.tan(math.radians(ANGLE))
 PRESSED = 2e-3

@@ -19,6 +19,8 @@ from pbem.results.reader import Results, open_results
 from tests.cli.cli_sample import BLOCKS
 from tests.verification.planes import ROCK
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Real = NDArray[np.float64]
 MATERIALS = {"rock": {"young": ROCK.young, "poisson": ROCK.poisson}}
 

@@ -13,6 +13,8 @@ import pytest
 import pbem
 from pbem.cli import main
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Tables = dict[str, Any]
 
 

@@ -14,6 +14,8 @@ from pbem.arrays import Complex
 from pbem.errors import CaseError
 from pbem.results.reader import Results
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 
 def make_halves(turn: complex, turned_round: bool = False, **more: Any) -> dict[str, Any]:
     """Two halves of different materials, bonded, each with a part of a crack that a fluid opens."""

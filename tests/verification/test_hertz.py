@@ -14,6 +14,8 @@ import pytest
 
 import pbem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 HALF_ANGLE, WIDE = math.radians(30.0), 6.0
 NU, STIFFER_NU = 0.3, 0.2
 

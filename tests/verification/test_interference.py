@@ -10,6 +10,8 @@ import pytest
 
 import pbem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 BORE, FIT, OUTSIDE = 10.0, 25.0, 40.0
 INTERFERENCE = 0.02
 SHAFT, RING = (2.1e5, 0.3), (1.0e5, 0.25)

@@ -13,6 +13,8 @@ import pytest
 import pbem
 from pbem.solve.problem.step import SilentReporter
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # Of the joint: initial stiffness, largest closure of one that stiffens; in-situ stress down the column, and across.
 STIFFNESS, CLOSURE, ACROSS = 2e3, 4e-3, 2.0
 LAWS: dict[str, dict[str, Any]] = {

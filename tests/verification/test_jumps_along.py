@@ -15,6 +15,8 @@ import pytest
 
 import pbem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Tables = dict[str, Any]
 JUMP = 1e-7  # relative to the length of the curve: a jump is a steep part of a table
 

@@ -13,6 +13,8 @@ import pytest
 import pbem
 from pbem.model.build import build_model
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Tables = dict[str, Any]
 
 

@@ -15,6 +15,8 @@ import pytest
 import pbem
 from pbem.results.reader import Results
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 TOP, LOW, DISC = 3.0, 1.0, 0.7
 NU = {"top": 0.3, "low": 0.2, "disc": 0.35}
 

@@ -16,6 +16,8 @@ from pbem.results.pushed_faces import find_pushed_faces
 from pbem.results.traces import list_traces
 from pbem.solve.problem.step import SilentReporter
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 MODULUS, POISSON = 1e3, 0.25
 DEPTH = 4 * (1 - POISSON**2) / MODULUS  # in the middle of a crack from -1 to 1 under a pressure of 1
 

@@ -13,6 +13,8 @@ import pbem
 from pbem.results.curve_profile import read_profile
 from pbem.results.traces import list_traces
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 YOUNG, POISSON = 1000.0, 0.25
 TENSION, GAP = 0.5, 0.01
 STRESS, STIFFNESS = -5.0, 200.0

@@ -15,6 +15,8 @@ from pbem.arrays import Complex, Real
 from pbem.errors import ResultFileError
 from pbem.results.reader import Results
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 MATERIAL = {"young": 3e3, "poisson": 0.2}
 # Shifted, turned, and in other units of length.
 PLACES = [(0j, 1 + 0j), (1e6 - 2e5j, 40 * np.exp(0.7j))]

@@ -16,6 +16,8 @@ from pbem.results.reader import Results
 from scripts.study_loose import judge
 from tests.verification.rigid_sample import Place, find_persson_force, lay_pin, write_pin
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 
 def run(text: str, path: Path) -> Results:
     path.write_text(text, encoding="utf-8")

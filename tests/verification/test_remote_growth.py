@@ -11,6 +11,8 @@ import pytest
 import pbem
 from pbem.arrays import Complex, Real
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 YOUNG, POISSON, DENSITY, K0 = 3e3, 0.2, 2.0, 0.5
 
 

@@ -34,6 +34,8 @@ from tests.verification.rigid_sample import (
     lay_pin,
 )
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 ENDS = pytest.mark.parametrize("end", ["rigid", "force", "tool"])
 
 

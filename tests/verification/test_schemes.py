@@ -15,6 +15,8 @@ import pbem
 from pbem.results.reader import Results
 from scripts import study_stacks
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 GAP = 2.4e-4
 WEDGE = study_stacks.Sample(
     kind="wedge", gap=GAP, approach=3.3e-3, friction=0.3, stiffness=5.6, scheme="SST", elements=12, width=0.7,

@@ -16,6 +16,8 @@ import pbem
 from pbem.results.contents import Tips
 from pbem.results.tip_notes import doubt_factors
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 YOUNG, POISSON = 1e3, 0.25
 MODULUS = YOUNG / (1 - POISSON**2)
 TERMS = 60

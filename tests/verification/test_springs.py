@@ -10,6 +10,8 @@ import pytest
 
 import pbem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 MATERIAL = {"young": 3e3, "poisson": 0.2}
 
 

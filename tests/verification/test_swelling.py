@@ -14,6 +14,8 @@ from pbem.results.field_values import VertexField
 from pbem.results.region_triangles import triangulate
 from tests.unit.test_plots_field import make_view
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 FINE = {"elements": 24}
 
 

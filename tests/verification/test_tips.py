@@ -32,6 +32,8 @@ from tests.verification.proofs.cracks import KINK, PLANE_MODULUS, solve_plate
 from tests.verification.proofs.proof import line
 from tests.verification.ways import limit_ratios, make_arc_crack, make_griffith, make_kinked_crack, measure
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Factors = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
 SLATE = Material("slate", 25e3, 0.25)
 

@@ -11,6 +11,8 @@ import pytest
 import pbem
 from pbem.results.describe import _describe_energy as describe_energy
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Tables = dict[str, Any]
 
 

@@ -24,6 +24,8 @@ from pbem.model.build import build_model
 from pbem.results.reader import Results
 from scripts.conditions.draft import SCHEMES
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # (place z, arc length s, time t) to a value
 Function = Callable[[complex, float, float], float]
 KINDS = ("number", "xy", "s", "t", "table")

@@ -11,6 +11,8 @@ import pytest
 import pbem
 from pbem.results.reader import Results
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 YOUNG, POISSON = 200.0, 0.3
 # Of the injection: half-length a of what slips over sqrt(4 alpha t), and slip in its middle delta E'/(f dp a), by
 # T = (f sigma' - tau)/(f dp) (Viesca, J. Fluid Mech. 928, A29, 2021).

@@ -25,14 +25,14 @@ sys.exit(main(sys.argv[1:]))
 
 
 def run_hierarchical(
-    snippet: Launch, folder: Path, text: str, ranks: Sequence[int], *options: str
+    snippet: Launch, folder: Path, text: str, ranks: Sequence[int], *options: str, before: str = ""
 ) -> list[Results]:
     """The results of a case by the hierarchical operator, on each of these numbers of ranks, without estimated errors;
-    options: of PETSc."""
+    options: of PETSc; before: a piece of Python that comes first."""
     (folder / "case.toml").write_text(text)
     results = []
     for count in ranks:
-        done = snippet(count, WITHOUT_ERRORS, "run", "case.toml", "-o", f"{count}.h5", "--quiet",
+        done = snippet(count, before + WITHOUT_ERRORS, "run", "case.toml", "-o", f"{count}.h5", "--quiet",
                        "--operator", "hierarchical", *options, cwd=folder)  # fmt: skip
         assert done.returncode == 0, done.stderr
         results.append(open_results(folder / f"{count}.h5"))

@@ -88,12 +88,6 @@ def test_the_case_shows_what_it_should(whole: Path) -> None:
         assert file["all/contact/dilation"].attrs["unit"] == "length"
 
 
-def test_two_ranks_give_the_same(whole: Path, tmp_path: Path) -> None:
-    run = launch(2, "run", whole.with_name("case.toml"), "-o", tmp_path / "more.h5")
-    assert run.returncode == 0, run.stderr
-    expect_alike(whole, tmp_path / "more.h5", 1e-11)
-
-
 def test_the_hierarchical_operator_gives_the_same(whole: Path, tmp_path: Path) -> None:
     """Directions of former systems would not serve, as the columns of all pairs that slip change. Of the way back the
     steps may differ, at whose beginnings the joint takes its angle."""
@@ -104,9 +98,9 @@ def test_the_hierarchical_operator_gives_the_same(whole: Path, tmp_path: Path) -
         np.testing.assert_allclose(two, one, rtol=0, atol=1e-7 * np.abs(one).max(), err_msg=name)
 
 
-def test_a_run_that_is_resumed_on_three_ranks_gives_the_same(whole: Path, tmp_path: Path) -> None:
+def test_a_run_on_two_ranks_that_is_resumed_on_three_gives_the_same(whole: Path, tmp_path: Path) -> None:
     case, resumed = whole.with_name("case.toml"), tmp_path / "resumed.h5"
-    stopped = launch_python(1, "-c", STOPPING, "fail", "4", "run", case, "-o", resumed)
+    stopped = launch_python(2, "-c", STOPPING, "fail", "4", "run", case, "-o", resumed)
     assert stopped.returncode == 3, stopped.stderr
     with h5py.File(resumed) as file:
         assert len(file["steps/factor"]) == 3

@@ -125,10 +125,10 @@ def test_the_history_has_friction_in_both_directions(whole: Results) -> None:
     assert np.all(np.diff(whole.energy.dissipated) >= -1e-15) and whole.energy.dissipated[-1] > 0
 
 
-# In the midst of pressing, on reversal, after it, between two stages.
+# In the midst of pressing, on reversal, between two stages, before anything is stored.
 @pytest.mark.parametrize(
     ("how", "number", "before", "after"),
-    [("kill", 2, 1, 2), ("kill", 6, 2, 1), ("fail", 8, 1, 3), ("fail", 10, 2, 1), ("kill", 1, 1, 2)],
+    [("kill", 2, 1, 2), ("kill", 6, 2, 1), ("fail", 10, 1, 3), ("kill", 1, 1, 2)],
 )
 def test_a_stopped_run_is_resumed_on_other_ranks(
     how: str, number: int, before: int, after: int, folder: Path, whole: Results, mpirun: Launch, mpirun_snippet: Launch

@@ -13,6 +13,8 @@ from scipy.optimize import linprog
 
 import pbem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 GRAVITY, DENSITY, FRICTION = 9.81, 2400.0, 0.8
 
 

@@ -8,6 +8,8 @@ law, nor do other loads near by or shorter elements help but by chance.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -70,13 +72,28 @@ def run_dam(folder: Path, *args: Any) -> Any:
     return pbem.run(write_dam(*args), folder / "dam.h5", force=True)
 
 
+@pytest.fixture(scope="module")
+def end(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., pbem.ConvergenceError]:
+    """`end(lost, pressurised)` gives the error that a dam ends with; each is computed once."""
+
+    @cache
+    def compute(*args: Any) -> pbem.ConvergenceError:
+        said = "with the statuses of all other pairs held no choice"
+        with pytest.raises(pbem.ConvergenceError, match=said) as caught:
+            run_dam(tmp_path_factory.mktemp("dam"), *args)
+        return caught.value
+
+    return compute
+
+
 @pytest.mark.parametrize(("lost", "pressurised"), [(False, "open"), (True, "open"), (False, "all")])
-def test_all_that_is_lost_and_comes_back_is_named(lost: bool, pressurised: str, tmp_path: Path) -> None:
+def test_all_that_is_lost_and_comes_back_is_named(
+    lost: bool, pressurised: str, end: Callable[..., pbem.ConvergenceError]
+) -> None:
     """Of a pair that is open and wants to close, too. Whoever follows the advice in part is told of the rest."""
-    with pytest.raises(pbem.ConvergenceError, match="with the statuses of all other pairs held no choice") as caught:
-        run_dam(tmp_path, lost, pressurised)
-    assert caught.value.reason == "no admissible modes"
-    told = str(caught.value)
+    error = end(lost, pressurised)
+    assert error.reason == "no admissible modes"
+    told = str(error)
     assert ("cohesion_lost = true" in told) == (not lost)
     assert ('pressurised = "all"' in told) == (pressurised == "open")
     assert told.endswith("it may take both") == (not lost and pressurised == "open")
@@ -95,12 +112,10 @@ def test_the_advice_works_and_the_interface_bears_weight_and_thrust(
     assert abs(foot.integrate("traction_s")[-1]) == pytest.approx(THRUST * scale, rel=1e-3)
 
 
-def test_the_end_is_the_same_in_other_units_and_of_a_mirrored_dam(tmp_path: Path) -> None:
+def test_the_end_is_the_same_of_a_mirrored_dam_in_other_units(end: Callable[..., pbem.ConvergenceError]) -> None:
     told = set()
-    for mirrored, unit, stress in ((False, 1.0, 1.0), (True, 1.0, 1.0), (False, 1e3, 1e-3)):
-        with pytest.raises(pbem.ConvergenceError) as caught:
-            run_dam(tmp_path, False, "open", mirrored, unit, stress)
-        text, place = str(caught.value), r"\((-?[\d.]+), 0\)"
+    for unit, error in ((1.0, end(False, "open")), (1e3, end(False, "open", True, 1e3, 1e-3))):
+        text, place = str(error), r"\((-?[\d.]+), 0\)"
         found = tuple(round(abs(float(x)) / unit, 4) for x in re.findall(place, text))
         assert len(found) == 2
         told.add((re.sub(place, "", text), found))

@@ -48,11 +48,11 @@ def push(shear: float, law: dict[str, float], unit: float = 1.0, shift: float = 
     return found, solution, describe_run(problem, memory, pushed, found.runs).detail if found.runs else ""
 
 
-@pytest.mark.parametrize("law", [
-    {"friction": 0.25}, {"friction": 0.25, "cohesion": 0.02},
-    {"friction": 0.3, "friction_dynamic": 0.25, "slip_distance": 0.01},
+@pytest.mark.parametrize(("law", "unit", "shift"), [
+    ({"friction": 0.25}, 1.0, 0.0), ({"friction": 0.25, "cohesion": 0.02}, 1e3, 1e3),
+    ({"friction": 0.3, "friction_dynamic": 0.25, "slip_distance": 0.01}, 1.0, 0.0),
+    ({"friction": 0.3, "friction_dynamic": 0.25, "slip_distance": 0.01}, 1e3, 1e3),
 ])  # fmt: skip
-@pytest.mark.parametrize(("unit", "shift"), [(1.0, 0.0), (1e3, 1e3)])
 def test_rest_is_the_equilibrium(law: dict[str, float], unit: float, shift: float) -> None:
     found, solution, _ = push(0.2, law, unit, shift, own=True)
     assert found.rest and found.runs is None and solution
@@ -61,13 +61,12 @@ def test_rest_is_the_equilibrium(law: dict[str, float], unit: float, shift: floa
     np.testing.assert_allclose(found.rest.normal_traction, solution.pairs.p_n, atol=1e-9)
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e-3])
-@pytest.mark.parametrize(("law", "largest", "motion"), [
-    ({"friction": 0.25}, 0.25, "translation"),
-    ({"friction": 0.25, "cohesion": 0.05}, 0.3, "translation"),
-    ({"friction": 0.25, "friction_dynamic": 0.2, "slip_distance": 1e-9}, 0.25, "translation"),
+@pytest.mark.parametrize(("law", "largest", "motion", "unit"), [
+    ({"friction": 0.25}, 0.25, "translation", 1e-3),
+    ({"friction": 0.25, "cohesion": 0.05}, 0.3, "translation", 1.0),
+    ({"friction": 0.25, "friction_dynamic": 0.2, "slip_distance": 1e-9}, 0.25, "translation", 1e-3),
     # About an edge at half its width of 2, by a push at its height of 1.
-    ({"friction": 3.0}, 1.0, "rotation"),
+    ({"friction": 3.0}, 1.0, "rotation", 1.0),
 ])  # fmt: skip
 def test_a_block_moves_on_beyond_the_largest_push(
     law: dict[str, float], largest: float, motion: str, unit: float
@@ -158,7 +157,7 @@ def test_what_moves_on_quickly_leaves_room_to_follow_it_slowly(monkeypatch: pyte
     assert "translation" in moves
 
 
-@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (1, 2, 0)])
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0)])
 def test_pairs_that_stay_as_they_are_are_not_asked(order: tuple[int, ...]) -> None:
     """A block of two that are bonded, over a slit that never closes, slides at the push that friction can balance."""
     curves = "\n".join(CURVES[k] for k in order)
@@ -178,8 +177,9 @@ def test_pairs_that_stay_as_they_are_are_not_asked(order: tuple[int, ...]) -> No
             np.testing.assert_array_equal(modes and modes.mode, solution.modes.mode)
 
 
-@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0)])
-@pytest.mark.parametrize("weakens", ["", ", friction_dynamic = 0.2, slip_distance = 0.01"])
+@pytest.mark.parametrize(("order", "weakens"), [
+    ((1, 2, 0), ""), ((0, 1, 2), ", friction_dynamic = 0.2, slip_distance = 0.01"),
+])  # fmt: skip
 def test_a_bonded_block_slides_at_its_limit_load(order: tuple[int, ...], weakens: str, tmp_path: Path) -> None:
     """Groups of pairs that settle together hold none whose mode cannot change."""
     text = GLUED.format(curves="\n".join(CURVES[k] for k in order), shear=0.4)

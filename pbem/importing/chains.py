@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Complex, Integer
+from pbem.arrays import Complex, Integer, Real
 from pbem.geometry.curve import Leg
 from pbem.geometry.shape import WIDEST_ARC
 
@@ -18,7 +18,7 @@ Edge = tuple[int, int]
 # Part of the mesh's extent by which nodes may be off the line or the circle that they are said to lie on.
 OFF = 1e-6
 # Largest angle (degrees) between the edges of a circle, if the mesh says that they are of one entity, and if not: a
-# regular polygon with fewer corners stays one. Between the parts of edges of higher order, which are known.
+# polygon stays one whose edges all turn by more. Between the parts of edges of higher order, which are known.
 WIDEST, WIDEST_UNTOLD, WIDEST_BENT = 46.0, 31.0, 91.0
 # Lengths of edges are equal up to this part of them.
 EQUAL = 1e-3
@@ -149,6 +149,18 @@ def fit_legs(
     return legs
 
 
+def may_be_circle(points: Sequence[complex]) -> bool:
+    """Whether the corners of a closed polygon, the last one the first, lie on a circle and are so many that it could be
+    meant."""
+    corners = np.array(points)
+    if len(corners) < 4 or corners[0] != corners[-1]:
+        return False
+    off = OFF * float(np.ptp(corners.real) + np.ptp(corners.imag))
+    nothing = np.full(len(corners), UNKNOWN)
+    path = _Path(np.append(corners, corners[1]), np.arange(len(corners) + 1), nothing, nothing)
+    return _may_be_round(path) and _fit_circle(corners[:-1], off) is not None
+
+
 def _run(path: _Path, first: int, off: float) -> int:
     """The last point of the longest straight or circular run that begins at a point."""
     straight = first
@@ -160,11 +172,12 @@ def _run(path: _Path, first: int, off: float) -> int:
     last = first + 1
     for end in range(first + 2 if bent is None else first + 1, path.edges + 1):
         part = path.part(first, end)
-        if abs(part.points[0] - part.points[-1]) <= off or not _is_round(part):
+        if abs(part.points[0] - part.points[-1]) <= off or part.is_bent is False or not _may_be_round(part):
             break
         if len(part.fine) > 3 and _fit_circle(part.fine, off) is None:
             break
-        last = end
+        if _is_round(part):
+            last = end
     return last if bent or _is_arc(path.part(first, last)) else first + 1
 
 
@@ -196,15 +209,28 @@ def _is_straight(points: Complex, off: float) -> bool:
 
 
 def _is_round(path: _Path) -> bool:
-    """Whether the edges turn by the same sign everywhere, and by less than a polygon's would."""
+    """Whether the edges turn by the same sign everywhere, and some by less than a polygon's would: of a circle that
+    something ends on, those on both sides of the place are of different lengths."""
     bent = path.is_bent
     if bent is False:
         return False
-    steps = np.diff(path.fine)
-    turns = np.degrees(np.angle(steps[1:] / steps[:-1]))
+    turns = np.abs(_measure_turns(path))
     told = bool(((path.entities[1:] == path.entities[:-1]) & (path.entities[1:] != 0)).any())
-    widest = WIDEST_BENT if bent else WIDEST if told else WIDEST_UNTOLD
+    least = WIDEST_BENT if bent else WIDEST if told else WIDEST_UNTOLD
+    return _may_be_round(path) and bool((turns <= least).any())
+
+
+def _may_be_round(path: _Path) -> bool:
+    """Whether the edges turn by the same sign everywhere, and by no more than those of any circle."""
+    turns = _measure_turns(path)
+    widest = WIDEST_BENT if path.is_bent else WIDEST
     return bool((np.abs(turns) <= widest).all() and ((turns > 0).all() or (turns < 0).all()))
+
+
+def _measure_turns(path: _Path) -> Real:
+    """By how much (degrees) the path turns at the points between its ends."""
+    steps = np.diff(path.fine)
+    return np.asarray(np.degrees(np.angle(steps[1:] / steps[:-1])))
 
 
 def _fit_circle(points: Complex, off: float) -> tuple[complex, float] | None:

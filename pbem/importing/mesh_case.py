@@ -15,7 +15,7 @@ from scipy.sparse import csgraph
 from pbem.errors import Fault, PbemError
 from pbem.geometry.curve import Leg
 from pbem.geometry.shape import Outline, outline
-from pbem.importing.chains import Edge, fit_legs, link
+from pbem.importing.chains import Edge, fit_legs, link, may_be_circle
 from pbem.importing.listing import format_place, write_case
 from pbem.importing.map_case import make_map_case, write_shape
 from pbem.importing.msh_file import Cell, Grid
@@ -68,6 +68,10 @@ def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Im
         f"{use}s: {uses[use]} ({', '.join(name for name, side, _, _ in names if side.use == use)})"
         for use in ("outer curve", "interface", "crack") if uses[use]
     ]
+    doubtful = [name for name, _, part, _ in names if part.straight and may_be_circle(part.points)]
+    if doubtful:
+        grid.notes.append(f"Corners on a circle, sides straight: {', '.join(doubtful)}. A physical line on it, or a "
+                          "finer mesh, would tell whether it is a circle.")
     notes = [*grid.notes, *_tell_defaults(options, uses)]
     parts = f"{len(left_out)} part{'s' * (len(left_out) != 1)}"
     groups = [(f"{parts} of the mesh left out", tuple(left_out))] if left_out else []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import cmath
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -9,7 +11,7 @@ from typing import Any
 import pytest
 
 from pbem.cli import main
-from tests.cli.gmsh_sample import Mesh, make_block, make_row, write_2, write_4, write_parts
+from tests.cli.gmsh_sample import Mesh, make_block, make_polygon, make_row, write_2, write_4, write_parts
 
 Capture = pytest.CaptureFixture[str]
 
@@ -120,3 +122,25 @@ def test_edges_that_lie_on_each_other_without_common_nodes_are_refused_with_them
     nodes = nodes | {new: nodes[tag] for tag, new in doubled.items()}
     said = refuse(write_2((nodes, [line for line in lines if line[0] < 4], upper, names)), capsys)
     assert "the edge at (0.25, 1): found two edges" in said and "and 1 more such place;" in said
+
+
+@pytest.mark.parametrize("first", [0, 4, 9])
+def test_a_circle_whose_edges_are_not_alike_is_one(first: int, capsys: Capture) -> None:
+    # A quarter in three edges and the rest in eight: of a hole on which something ends. Nothing tells that it is one.
+    angles = [*range(0, 90, 30), *(90 + 33.75 * k for k in range(8))]
+    corners = [3 + 2j + cmath.rect(0.5, math.radians(angle)) for angle in angles]
+    corners = corners[first:] + corners[:first]
+    tables = bring_in(write_4(make_polygon(corners, None, [0] * len(corners))))
+    curve, = tables["curves"].values()
+    assert curve["center"] == pytest.approx([3.0, 2.0]) and curve["radius"] == pytest.approx(0.5)
+    assert "Corners on a circle" not in capsys.readouterr().out
+
+
+def test_a_polygon_that_may_be_a_circle_is_told(capsys: Capture) -> None:
+    corners = [cmath.rect(0.5, 2 * math.pi * k / 10) for k in range(10)]
+    tables = bring_in(write_4(make_polygon(corners, None, [0] * 10)))
+    assert len(tables["curves"]["body_edge"]["points"]) == 11
+    assert "Corners on a circle, sides straight: body_edge." in capsys.readouterr().out
+    hexagon = [cmath.rect(0.5, math.pi * k / 3) for k in range(6)]
+    bring_in(write_4(make_polygon(hexagon, None, [0] * 6)))
+    assert "Corners on a circle" not in capsys.readouterr().out

@@ -270,10 +270,15 @@ def _make_curves(
                  max(z.imag for z in points) - min(z.imag for z in points))
     # In the order of the groups' numbers, and edges without one last.
     order = sorted(sides, key=lambda side: (not side.group, side.group))
-    return [
-        (side, fit_legs(chain, grid.nodes, grid.between, corners, extent))
-        for side in order for chain in link(sides[side], entities, corners)
-    ]
+    curves = []
+    for side in order:
+        for chain in link(sides[side], entities, corners):
+            legs = fit_legs(chain, grid.nodes, grid.between, corners, extent)
+            # A closed curve has no ends at which others may meet it.
+            meets = chain.closed and chain.nodes[0] in corners and legs[0].start == grid.nodes[chain.nodes[0]]
+            half = len(legs) // 2 if meets else 0
+            curves += [(side, part) for part in (legs[:half], legs[half:]) if part]
+    return curves
 
 
 def _name_curves(

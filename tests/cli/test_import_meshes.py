@@ -144,3 +144,12 @@ def test_a_polygon_that_may_be_a_circle_is_told(capsys: Capture) -> None:
     hexagon = [cmath.rect(0.5, math.pi * k / 3) for k in range(6)]
     bring_in(write_4(make_polygon(hexagon, None, [0] * 6)))
     assert "Corners on a circle" not in capsys.readouterr().out
+
+
+def test_blocks_that_touch_in_a_corner_have_curves_that_end_there() -> None:
+    nodes = {1 + i + 3 * j: complex(i, j) for j in range(3) for i in range(3)}
+    blocks = [(1, 1, (1, 2, 5, 4)), (2, 2, (5, 6, 9, 8))]
+    tables = bring_in(write_2((nodes, [], blocks, {(2, 1): "low", (2, 2): "high"})))
+    assert sorted(tables["curves"]) == ["high_edge.1", "high_edge.2", "low_edge.1", "low_edge.2"]
+    ends = {name: (curve["points"][0], curve["points"][-1]) for name, curve in tables["curves"].items()}
+    assert all([1, 1] in pair for pair in ends.values())

@@ -66,11 +66,19 @@ def read_dxf(path: Path) -> Reading:
         reading.notes.append("Heights of points are ignored: the model is plane.")
     for what, count in sorted(hidden.items()):
         reading.left_out.append(f"{count} {what}: what the drawing does not show is not read")
+    for name, count in _count_on_paper(drawing):
+        reading.left_out.append(f"{count} on the sheet {show(name)}: only the model space is read")
     for kind, count in sorted(others.items()):
         reading.left_out.append(f"{count} {kind}: only {', '.join(KINDS)} are read")
     if reading.faults:
         raise fail(path, reading.faults)
     return reading
+
+
+def _count_on_paper(drawing: Any) -> list[tuple[str, int]]:
+    """Sheets other than the model space with lines on them, and how many."""
+    counts = [(str(sheet.name), sum(entity.dxftype() in KINDS for entity in sheet)) for sheet in drawing.layouts]
+    return [(name, count) for name, count in counts if count and name.lower() != "model"]
 
 
 def _find_hidden(entity: Any, drawing: Any) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import meshio
 import numpy as np
 import pytest
@@ -326,6 +327,16 @@ ENDTAB
 0
 ENDSEC
 """
+
+
+def test_lines_on_sheets_of_a_drawing_are_left_out_and_told(capsys: Capture) -> None:
+    drawing = ezdxf.new("R2010")  # type: ignore[attr-defined]
+    drawing.modelspace().add_line((0, 0), (2, 0))
+    for end in ((9, 9), (9, 0)):
+        drawing.layout("Layout1").add_line((0, 0), end)
+    drawing.saveas("map.dxf")
+    assert main(["import", "map.dxf", "-o", "made.toml"]) == 0
+    assert '2 on the sheet "Layout1": only the model space is read' in capsys.readouterr().out
 
 
 def test_what_a_drawing_does_not_show_is_left_out_and_told(capsys: Capture) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pbem.errors import ConvergenceError
+from pbem.geometry.tolerance import TIE
 from pbem.parallel import do_on_first
 from pbem.solve.nonlinear.imbalance import describe_imbalance
 from pbem.solve.problem.problem import Problem
@@ -15,6 +16,10 @@ from pbem.solve.steps.closed_gaps import find_closed_gap
 from pbem.solve.steps.linearity import describe_nonlinearity, measure_excess
 from pbem.solve.steps.open_faces import PushedFaces, describe_pushed, find_pushed
 from pbem.solve.steps.passing import Passing, describe_passing, find_passing
+
+# What has grown by so much is noted again. Under proportional loads it doubles exactly from the first step to the
+# second and to the fourth: rounding must not choose.
+GROWN = 2 * (1 - TIE)
 
 
 def note_imbalance(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
@@ -30,7 +35,7 @@ def note_imbalance(problem: Problem, step: Step, noted: float, reporter: Reporte
         detail = f"the step to the fraction {step.factor:.6g} of stage {name!r} is wrong: {error.detail}"
         raise ConvergenceError(error.reason, detail) from error
     amount = max(float(balance.relative.max(initial=0.0)), float(balance.part_relative.max(initial=0.0)))
-    if text is None or amount <= 2 * noted:
+    if text is None or amount <= GROWN * noted:
         return noted
     reporter.note(f"Step {step.number}: {text}.")
     return amount
@@ -41,7 +46,7 @@ def note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Repo
     assert step.linearity is not None
     amount = measure_excess(step.linearity)
     mesh = problem.mesh
-    if amount > 2 * noted:
+    if amount > GROWN * noted:
         notes = describe_nonlinearity(mesh.region_names, mesh.interface_names, step.linearity)
         for text in notes:
             reporter.note(f"Step {step.number}: {text}.")
@@ -64,7 +69,7 @@ def note_passing(
         return [each for k, each in enumerate(deepest) if each.names not in [other.names for other in deepest[:k]]]
 
     found = do_on_first(problem.comm, ConvergenceError, find)
-    new = [each for each in found if each.depth > 2 * noted.get(each.names, 0.0)]
+    new = [each for each in found if each.depth > GROWN * noted.get(each.names, 0.0)]
     for each in new:
         reporter.note(f"Step {step.number}: {describe_passing(each)}.")
     return {**noted, **{each.names: each.depth for each in new}}
@@ -83,7 +88,7 @@ def note_pushed(problem: Problem, step: Step, noted: Mapping[str, float], report
                            problem.laws.parted, step.contact.opening, step.contact.slip)
 
     found = do_on_first(problem.comm, ConvergenceError, find)
-    new = [each for each in found if each.depth > 2 * noted.get(each.name, 0.0)]
+    new = [each for each in found if each.depth > GROWN * noted.get(each.name, 0.0)]
     for text in describe_pushed(new):
         reporter.note(f"Step {step.number}: {text}.")
     return {**noted, **{each.name: each.depth for each in new}}

@@ -50,7 +50,7 @@ def fit_curves(
     jointed: frozenset[str], contacts: Mapping[str, tuple[str, str]], loads: Collection[PointLoad] = (),
     bonded: Collection[str] = (),
 ) -> FittedCurves:
-    """Divide curves anew where their elements are too long for the faces around them, or for loads inside.
+    """Divide curves anew where their elements are too long for the faces around them, or for point loads.
 
     tips: per crack whether its ends are tips; jointed: curves with contact pairs;
     bonded: those that always hold two regions together.
@@ -62,16 +62,15 @@ def fit_curves(
         + [SlotSide(crack, None) for crack in region.cracks]
         for region in regions
     ]
-    inside = [[load.place for load in loads if load.region == region.name and not load.on_boundary]
-              for region in regions]
+    loaded = [[load.place for load in loads if load.region == region.name] for region in regions]
     on_interfaces = find_interface_ends(curves, regions, bonded)
     last_bits = {end.point: choose_last_bit(end.power) for end in on_interfaces}
-    sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order, inside, last_bits)
+    sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order, loaded, last_bits)
     if sizes.excess is not None:
         return FittedCurves(curves, (), (), (_refuse(sizes.excess, curves),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     graded, near = _grade_contacts(case, sizes.curves, contacts)
-    notes = [*_note_added(curves, sizes.curves, any(inside)), *near, *_note_ties(ties), *_note_long(sizes.long),
+    notes = [*_note_added(curves, sizes.curves, any(loaded)), *near, *_note_ties(ties), *_note_long(sizes.long),
              *note_interface_ends(on_interfaces, sizes.curves, kept, MOST_NAMED),
              *_note_slender(case, sizes.curves, regions), *_note_thin(case, sizes.curves, regions, bonded)]
     return FittedCurves(graded, ties, tuple(notes), ())
@@ -159,7 +158,7 @@ def _refuse(excess: Excess, curves: Mapping[str, Curve]) -> Fault:
 
 
 def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve], loaded: bool) -> list[str]:
-    """loaded: there are point loads inside of regions."""
+    """loaded: there are point loads."""
     old, new = count_elements(before), count_elements(after)
     added = sorted((name for name in new if new[name] != old[name]), key=lambda name: old[name] - new[name])
     if not added:

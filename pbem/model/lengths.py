@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Curve
 from pbem.geometry.nearness import Distances, Surroundings
 from pbem.geometry.tolerance import TIE
+from pbem.model.point_loads import find_acted_on
 from pbem.model.roundings import BEARABLE, find_roundings, join_legs
 from pbem.model.sliver import Reach, Wedges
 
@@ -23,7 +24,7 @@ REACH = (1.0, 1.0, 2.0, 2.0)
 # lies between by less than displacement equations do (mouth of a crack at 7 degrees to a surface: 1.2 % with the above
 # at order 2, 0.2 % with these; J of a beam split along its middle at order 3: 1.2 % with the above, 0.1 % with these).
 BENDING = (0.5, 0.5, 1.0, 1.0)
-# The same from a force or a moment at a point inside a region, whose field the remainder has to cancel on the boundary.
+# The same from a force or a moment at a point of a region, whose field the remainder has to cancel on the boundary.
 LOADED = 0.5
 # Length of a tip's element as a part of the tip's distance from faces that bound the region. In a cantilever beam split
 # along its middle J was 2.7 % off with elements as long as half of its height, 0.5 % with these.
@@ -118,7 +119,7 @@ class LengthField:
         self, surroundings: Surroundings, wedges: Wedges, tips: Mapping[str, tuple[bool, bool]], kept: frozenset[str],
         order: int, loads: Sequence[tuple[frozenset[str], Complex]] = (),
     ) -> None:
-        """loads: curves around a region, and the places of point loads inside of it."""
+        """loads: curves around a region, and the places of point loads inside of it or on its boundary."""
         legs = surroundings.legs
         self.surroundings, self.wedges, self.reach = (
             surroundings, wedges, Reach(REACH[order], BENDING[order], order < 2)
@@ -145,8 +146,7 @@ class LengthField:
         longest = np.array([np.diff(ends).max() for ends in self._ends]) * self.length
         self._roundings = find_roundings(legs, surroundings.curve, longest, order)
         self._tips, self._at_tip = self._collect_tips(tips)
-        self._loads = [(np.array([name in around for name in surroundings.curve], dtype=bool) & ~self.kept,
-                        cKDTree(np.column_stack([at.real, at.imag]))) for around, at in loads]
+        self._loads = [each for around, places in loads for each in self._group_loads(around, places)]
 
     def list_elements(self) -> Cells:
         """The elements of all legs."""
@@ -233,8 +233,22 @@ class LengthField:
         tips = tips.select(elsewhere | (self._component[leg] == self._tips.component[tips.box]))
         return Near(self.surroundings.find_near(cells.leg, around), tips, np.arange(len(points)))
 
+    def _group_loads(self, around: frozenset[str], places: Complex) -> Iterator[tuple[Bool, cKDTree]]:
+        """The legs that follow their distance from loads, with the places of these: all curves of the region that the
+        program grades, but for those that the field of a load on the boundary leaves free of traction."""
+        legs = self.surroundings.legs
+        bounding = np.array([name in around for name in self.surroundings.curve], dtype=bool)
+        ends = np.array([(leg.start, leg.end) for leg in legs], dtype=complex)
+        on_boundary = np.isin(places, ends[bounding])
+        for group in (places[~on_boundary], *places[on_boundary, None]):
+            own = bounding & ~self.kept
+            if len(group) and group[0] in ends[bounding]:
+                own &= find_acted_on(legs, complex(group[0]))
+            if own.any() and len(group):
+                yield own, cKDTree(np.column_stack([group.real, group.imag]))
+
     def _measure_from_loads(self, legs: Integer, points: Complex) -> Real:
-        """What point loads inside of the regions allow."""
+        """What point loads allow."""
         allowed = np.full(len(points), np.inf)
         for around, tree in self._loads:
             own = np.flatnonzero(around[legs])

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pbem.arrays import Bool
 from pbem.description.case import Case
 from pbem.description.field_tables import PointForceTable
 from pbem.errors import Fault, KeyPath
@@ -140,10 +141,10 @@ def place_point_loads(
                                  "moments inside regions; on a boundary two forces, or tractions along a curve")
         else:
             found = _place_inside(loc, name, point, curves, loops)
-            if isinstance(found, PointLoad):
-                wrong, note = _check_distance((*loc, "at"), name, point, curves, kept)
-                faults += wrong
-                notes += note
+        if isinstance(found, PointLoad):
+            wrong, note = _check_distance((*loc, "at"), found, curves, kept)
+            faults += wrong
+            notes += note
         if isinstance(found, Fault):
             faults.append(found)
         elif found is not None:
@@ -172,16 +173,19 @@ def _place_inside(
 
 
 def _check_distance(
-    loc: KeyPath, name: str, point: complex, curves: Mapping[str, Curve], kept: Set[str]
+    loc: KeyPath, load: PointLoad, curves: Mapping[str, Curve], kept: Set[str]
 ) -> tuple[list[Fault], list[str]]:
-    """Loads inside that are too near to a curve, or so near that its elements should be shorter.
+    """Loads inside that are too near to a curve, or so near that its elements should be shorter; of those on a boundary
+    the latter, by curves to which they bring tractions.
 
     kept: curves whose grading is the user's; others get elements later that are as short as the loads want them.
     """
     near: list[tuple[float, str, float]] = []
     for curve in (curves[name] for name in curves if name in kept):
         for leg in curve.legs:
-            t, distance = project(leg, point)
+            if load.on_boundary and not find_acted_on([leg], load.place)[0]:
+                continue
+            t, distance = project(leg, load.place)
             ends = leg.element_fractions()
             at = min(max(int(np.searchsorted(ends, t)), 1), len(ends) - 1)
             near.append((distance / (leg.length * float(ends[at] - ends[at - 1])), curve.name, distance))
@@ -189,13 +193,24 @@ def _check_distance(
         return [], []
     part, curve_name, distance = min(near)
     where = f"{distance:.3g} from curve '{curve_name}', {part:.2g} times the length of its elements"
-    if part < TOO_NEAR:
+    if part < TOO_NEAR and not load.on_boundary:
         expected = ("a point on the curve, or further away from it, or shorter elements there, "
                     "as grading = \"auto\" makes")
         return [Fault.at(loc, f"a point {where}", expected)], []
     if part >= NEAR:
         return [], []
-    return [], [f"The point load '{name}' lies {where}: shorter ones there are more accurate."]
+    return [], [f"The point load '{load.name}' lies {where}: shorter ones there are more accurate."]
+
+
+def find_acted_on(legs: Sequence[Leg], place: complex) -> Bool:
+    """The legs (k,) to which the field of a force at the end of some of them brings tractions. It is radial (Flamant;
+    of a wedge, Michell): straight legs that lead through the place are free of any, and what is left on curved ones
+    that end there changes with the curvature alone."""
+    ends = np.array([(leg.start, leg.end) for leg in legs], dtype=complex)
+    tangents = np.array([(leg.tangent(at_end=False), leg.tangent(at_end=True)) for leg in legs], dtype=complex)
+    away = ends - place
+    across = np.abs((np.conj(tangents) * away).imag) > TIE * np.abs(away)
+    return np.asarray(across.any(axis=1) & away.all(axis=1))
 
 
 def _place_on_boundary(

@@ -72,7 +72,7 @@ def fit_lengths(
 ) -> Sizes:
     """Divide the legs anew whose elements are longer than other faces, a crack tip or a point load allow.
 
-    regions: curves of every region; loads: the places of point loads inside each of them; tips: per crack whether its
+    regions: curves of every region; loads: the places of point loads in each of them; tips: per crack whether its
     start and its end have tip elements; kept: curves whose grading is the user's, which follow the rule beside tips
     only; order: of the polynomials; last_bits: the shortest elements, as parts of legs, at points where cracks end on
     interfaces.

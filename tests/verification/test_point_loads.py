@@ -13,6 +13,7 @@ import pytest
 import pbem
 from pbem.arrays import Complex, Real
 from pbem.errors import ResultFileError
+from pbem.model.build import build_model
 from pbem.results.reader import Results
 
 pytestmark = pytest.mark.usefixtures("without_errors")
@@ -395,3 +396,63 @@ def test_a_load_is_as_near_to_a_face_as_one_likes_where_the_program_grades(unit:
     exact = displace(0.0)
     for depth in (0.02, 1e-3, 1e-5):
         np.testing.assert_allclose(displace(depth), exact, rtol=0, atol=(0.5 * depth + 2e-4) * np.abs(exact).max())
+
+
+@pytest.mark.parametrize(("size", "at", "order", "allowed"), [
+    ((8.0, 0.25), 6.6, 2, 1e-3), ((8.0, 0.25), 6.6, 3, 1e-4), ((20.0, 0.5), 7.3, 2, 1e-3), ((8.0, 0.5), 4.0, 3, 1e-4),
+])
+@pytest.mark.parametrize(("unit", "degrees"), [(1.0, 0.0), (1e-4, 53.0)])
+def test_a_slender_beam_under_a_force_on_its_top(
+    size: tuple[float, float], at: float, order: int, allowed: float, unit: float, degrees: float, tmp_path: Path
+) -> None:
+    """Both ends carry what statics says: the face opposite the load follows its distance."""
+    (length, height), turn = size, unit * np.exp(1j * np.deg2rad(degrees))
+    corners = [0j, length + 0j, length + 1j * height, 1j * height]
+    x = [[float((turn * corner).real), float((turn * corner).imag)] for corner in corners]
+    force, place = turn / unit * -1j, turn * (at + 1j * height)
+    curves = {
+        name: {"points": [x[k], x[(k + 1) % 4]], "elements": 4 if k % 2 else 12}
+        for k, name in enumerate(("foot", "right", "top", "left"))
+    }
+    results = pbem.run({
+        "materials": {"steel": {"young": 1e4, "poisson": 0.3, "plane": "stress"}},
+        "curves": curves,
+        "regions": {"beam": {"material": "steel", "boundary": list(curves)}},
+        "boundary": {"left": {"us": 0.0}, "right": {"us": 0.0, "tn": 0.0}},
+        "point_loads": {"load": {"fx": float(force.real), "fy": float(force.imag),
+                                 "at": [float(place.real), float(place.imag)]}},
+        "point_supports": {"still": {("ux" if degrees == 0.0 else "uy"): 0.0, "at": x[1]}},
+        "analysis": {"steps": 1, "order": order},
+    }, tmp_path / "beam.h5")
+    for name, part in (("left", 1 - at / length), ("right", at / length)):
+        reaction = complex(*results.reactions[name][-1]) * np.conj(turn / unit)
+        assert abs(reaction - 1j * part) < allowed, name
+
+
+def make_plate(loads: int, grading: str) -> pbem.Case:
+    """A plate of 10 by 1 on 10 elements with forces along its top."""
+    corners = [[0, 0], [10, 0], [10, 1], [0, 1]]
+    curves = {
+        name: {"points": [corners[k], corners[(k + 1) % 4]], "elements": 4 if k % 2 else 7, "grading": grading}
+        for k, name in enumerate(("foot", "right", "top", "left"))
+    }
+    return pbem.Case(
+        materials={"steel": {"young": 1e4, "poisson": 0.3}}, curves=curves,
+        regions={"plate": {"material": "steel", "boundary": list(curves)}},
+        boundary={"left": {"ux": 0.0, "uy": 0.0}},
+        point_loads={f"p{k}": {"fy": -1.0, "at": [k + 0.5, 1.0]} for k in range(loads)},
+    )
+
+
+def test_loads_along_a_straight_face_add_no_elements_to_it() -> None:
+    """Their fields leave it free of traction; the opposite face of a plate as thin as their distance gets more."""
+    model = build_model(make_plate(10, "auto"))
+    counts = {name: sum(leg.elements for leg in curve.legs) for name, curve in model.curves.items()}
+    assert counts["top"] <= 22
+    assert counts["foot"] >= 18
+
+
+def test_long_elements_opposite_a_load_are_told_where_the_grading_is_given() -> None:
+    notes = [note for note in build_model(make_plate(2, "none")).notes if "point load" in note]
+    assert len(notes) == 2
+    assert notes[0].startswith("The point load 'p0' lies 1 from curve 'foot', 0.7 times the length of its elements")

@@ -33,6 +33,6 @@ def without_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     estimated errors."""
 
     def make_none(model: Model, mesh: Mesh, *_: Any) -> Estimator:
-        return Estimator(model, mesh, None, None, "not asked for")
+        return Estimator(model, mesh, None, None)
 
     monkeypatch.setattr(driver, "make_estimator", make_none)

@@ -19,7 +19,7 @@ import pbem.driver
 from pbem.cli import main
 from pbem.parallel import world
 from pbem.results.estimator import Estimator
-pbem.driver.make_estimator = lambda model, mesh, *_: Estimator(model, mesh, None, None, "none", world.rank == 0)
+pbem.driver.make_estimator = lambda model, mesh, *_: Estimator(model, mesh, None, None, "", world.rank == 0)
 sys.exit(main(sys.argv[1:]))
 """
 

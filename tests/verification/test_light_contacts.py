@@ -74,7 +74,7 @@ def _compare(results: Results, unit: float, modulus: float) -> tuple[float, list
 
 
 @pytest.mark.parametrize(("approach", "scheme"), [
-    (1e-5, "SST"), (1e-3, "SST"), (1e-2, "SST"), (1e-5, "DBEM"), (3e-4, "DBEM"), (2e-5, "HST"), (1e-3, "THST"),
+    (1e-5, "SST"), (1e-2, "SST"), (3e-4, "DBEM"), (2e-5, "HST"), (1e-3, "THST"),
 ])
 def test_a_disc_between_blocks(approach: float, scheme: str, tmp_path: Path) -> None:
     results = pbem.run(_make(approach, scheme=scheme), output=tmp_path / "disc.h5")
@@ -86,7 +86,7 @@ def test_a_disc_between_blocks(approach: float, scheme: str, tmp_path: Path) -> 
 
 @pytest.mark.parametrize(("approach", "unit", "modulus", "turn", "shift", "where", "elements"), [
     (7e-4, 1e-3, 2e11, 0.4, 1 - 2j, 0.31, 12), (3e-5, 40.0, 3e3, -1.2, -900 + 300j, -0.77, 24),
-    (3e-5, 1e4, 1e-2, 3.0, 0j, 0.05, 33), (7e-4, 1e4, 1e-2, 3.0, 0j, 0.05, 33),
+    (7e-4, 1e4, 1e-2, 3.0, 0j, 0.05, 33),
 ])  # fmt: skip
 def test_it_elsewhere(
     approach: float, unit: float, modulus: float, turn: float, shift: complex, where: float, elements: int,

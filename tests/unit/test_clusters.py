@@ -165,6 +165,40 @@ def test_the_stiffness_is_that_of_the_whole_model(many_groups: None, text: str) 
     tangent.destroy()
 
 
+@pytest.mark.parametrize("text", [write_network(), grow_branches(2, 6)], ids=["comb", "branches"])
+def test_what_is_beyond_follows_as_in_the_whole_model(
+    many_groups: None, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two solutions of the whole that differ in the modes of a cluster's pairs alone differ by its stiffness."""
+    monkeypatch.setattr(clusters_module, "MOST_FOLLOWED", 1000)
+    monkeypatch.setattr(clusters_module, "FOLLOWING", 1000)  # all elements there are
+    problem = assemble(text)
+    tangent, load, modes = problem.make_tangent(), problem.evaluate_load(0, 1.0), draw_modes(problem.mesh.pairs.count)
+    assert isinstance(tangent, KrylovTangent)
+
+    def solve(modes: ModeState) -> tuple[Any, Real]:
+        law = linearise_pairs(problem, modes, -1.0)
+        constraints = problem.constrain(law, load)
+        solved = tangent.solve(constraints, load, law)
+        return constraints, stack_states(evaluate_pairs(problem.mesh, law, solved.unknowns))
+
+    constraints, before = solve(modes)
+    clusters = tangent.find_clusters(load)
+    assert clusters is not None
+    found: list[tuple[NDArray[np.int64], Real]] = []
+    clusters.solve(choose_pairs(problem.laws.count, 1, 0.02), 1, lambda *each: found.append(each), constraints)
+    assert found and max(len(pairs) for pairs, _ in found) < problem.laws.count
+    for pairs, stiffness in found[:2]:
+        mode = modes.mode.copy()
+        mode[pairs] = np.random.default_rng(9).permutation(mode[pairs])
+        change = (solve(ModeState(mode, modes.sign))[1] - before)[pairs]
+        tractions = (stiffness @ change[:, 2:].ravel()).reshape(-1, 2) * problem.traction_scale
+        largest = np.abs(change[:, :2]).max()
+        assert largest > 1e-3 * np.abs(before[:, :2]).max()
+        np.testing.assert_allclose(tractions, change[:, :2], rtol=0, atol=1e-5 * largest)
+    tangent.destroy()
+
+
 def test_values_are_those_of_the_clusters_and_of_the_leaders(grown: tuple[Problem, Clusters]) -> None:
     problem, clusters = grown
     chosen, count = choose_pairs(problem.laws.count, 7, 0.03), problem.laws.count

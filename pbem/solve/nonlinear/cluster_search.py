@@ -13,7 +13,7 @@ import numpy as np
 from pbem.arrays import Bool, Integer, Real
 from pbem.contact.cluster_laws import ClusterContact
 from pbem.contact.complementarity import take_subset
-from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal
@@ -57,13 +57,14 @@ class ClusterSearch:
 
     def settle(
         self, tangent: TangentOperator, search: Search, modes: ModeState, law: Linearisation, solved: Solved,
-        state: PairState,
+        state: PairState, constraints: ConstraintMap | None = None,
     ) -> tuple[ModeState, PairState, Bool] | None:
         """Modes and states (m,) of all pairs, with those of the clusters around the ones that change, and what all else
         asks for, and which pairs have settled; None if no cluster does, or what is near says otherwise than the whole
         did. All ranks together.
 
-        law, solved: linearised at the modes, and the solution; state: of the pairs in it.
+        law, solved: linearised at the modes, and the solution; state: of the pairs in it. constraints: by which what is
+        beyond a cluster follows it; without, that stays as it is.
         """
         problem, memory, load, proposal = self._problem, self._memory, self._load, search.proposal
         clusters = tangent.find_clusters(load)
@@ -85,7 +86,7 @@ class ClusterSearch:
             found = near and contact.end(near, lambda at, now: judge(part.laws, at, now, part.memory, part.pressure))
             return np.column_stack([found[0].mode, found[0].sign, stack_states(found[1])]) if found else None
 
-        values, settled = clusters.solve(proposal.changed, 6, find)
+        values, settled = clusters.solve(proposal.changed, 6, find, constraints)
         chosen = _put_modes(problem, modes, proposal, values[:, :2], settled)
         if not settled.any() or chosen.fingerprint() == modes.fingerprint():
             return None

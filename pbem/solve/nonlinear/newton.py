@@ -361,7 +361,7 @@ class _Run:
         if not self.clusters.suits(self.search):
             return None
         settled = self.clusters.settle(
-            self.tangent, self.search, self.modes, found.law, found.solved, found.outcome.pairs)
+            self.tangent, self.search, self.modes, found.law, found.solved, found.outcome.pairs, found.constraints)
         if settled is None:
             return None
         self.blocks.settle(*settled[1:])

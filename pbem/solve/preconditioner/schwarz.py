@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from pbem.arrays import Integer, Real
 from pbem.bem.group_sizes import MOST_LEFT_OF_BODIES, MOST_TIMES
@@ -25,7 +26,7 @@ from pbem.mesh.numbering import list_nodes, number_components
 from pbem.model.material import Material
 from pbem.parallel import largest_of_parts
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
-from pbem.solve.preconditioner.inversion import invert_rows
+from pbem.solve.preconditioner.inversion import SINGULAR, invert_rows
 from pbem.solve.preconditioner.local_operator import LocalOperator
 from pbem.solve.preconditioner.near_map import NearMap, take_near
 from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
@@ -290,6 +291,37 @@ class SchwarzPreconditioner:
         turned[rows[~rest]] = (-forces - whole @ result[left])[~rest]
         result += (less.inverse @ turned.reshape(len(nodes), 2, -1)).reshape(result.shape)
         return np.asarray(result[np.ix_(asked, np.searchsorted(at, asked))])
+
+    def condense(
+        self, constraints: ConstraintMap, free: ConstraintMap, elements: Integer, nodes: Integer
+    ) -> Real | None:
+        """Rows and columns (2 k, 2 k) of the tangent operator of a map `free` for some nodes of elements, all other
+        unknowns of these following by the map of the constraints; None where these are not determined by that.
+
+        Of the model the elements alone are there; constraints: those of `update`. (theory, 136)
+        """
+        all_nodes = list_nodes(self._mesh, elements)
+        around = number_components(all_nodes)
+        asked = number_components(np.searchsorted(all_nodes, nodes))
+        at = np.sort(asked)
+        other = np.ones(len(around), dtype=bool)
+        other[at] = False
+        # The elements can be those of other ranks.
+        near, loose = (self.take_near(each, all_nodes) for each in (constraints, free))
+        less = self._eliminate(near, near.take_blocks())
+        # What is eliminated of the others is in no other equation.
+        rows, left = np.flatnonzero(other & ~less.first.ravel()), np.flatnonzero(other & ~less.local.ravel())
+        block = self._local.form(elements, around, at, at, loose, None)
+        if len(left):
+            matrix = self._local.form(elements, around, rows, left, near, less)
+            size = float(np.abs(matrix).sum(axis=0).max())
+            factors, pivots, zero = lapack.dgetrf(matrix)
+            if zero or not lapack.dgecon(factors, size)[0] > SINGULAR:
+                return None
+            follows = lapack.dgetrs(factors, pivots, self._local.form(elements, around, rows, at, loose, less))[0]
+            block -= self._local.form(elements, around, at, left, near, None) @ follows
+        place = np.searchsorted(at, asked)
+        return np.asarray(block[np.ix_(place, place)])
 
     def form_block(self, near: NearMap, elements: Integer, nodes: Integer) -> Real:
         """Rows of the tangent operator of a constraint map and its columns, of some nodes of elements: (2 k, 2 k).

@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.clock import clock
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.deferred_laws import free_jumps
 from pbem.contact.loads import Load
 from pbem.parallel import add_up
@@ -35,6 +36,9 @@ NEIGHBOURS = 16
 MOST_ELEMENTS = 80
 # Elements around a cluster, as a multiple of its own, and at least.
 AROUND, LEAST_AROUND = 1.0, 32
+# So few clusters are solved for with so many elements beyond that follow in the modes that they have. What is left at
+# the end are contacts that a crack slides along: their tractions follow from where all of it slides to.
+MOST_FOLLOWED, FOLLOWING = 6, 400
 
 
 @dataclass(frozen=True)
@@ -72,13 +76,16 @@ class Clusters:
             for element in block.tolist():
                 self._blocks_of.setdefault(element, []).append(number)
 
-    def solve(self, chosen: Bool, columns: int, solve: SolveCluster) -> tuple[Real, Bool]:
+    def solve(
+        self, chosen: Bool, columns: int, solve: SolveCluster, constraints: ConstraintMap | None = None
+    ) -> tuple[Real, Bool]:
         """See PairClusters; each rank for some of the clusters."""
         problem, comm = self._problem, self._problem.comm
         formed = self.form(chosen)
         found = np.zeros((len(chosen), columns + 1))
         with clock.piece("clusters"):
-            own = self._list_stiffness(formed[comm.rank :: comm.size])
+            following = constraints if len(formed) <= MOST_FOLLOWED else None
+            own = self._list_stiffness(formed[comm.rank :: comm.size], following)
             for _ in range(0, len(formed), comm.size):
                 for each, stiffness in islice(own, 1):  # none on the last ranks in the last round
                     values = solve(each.pairs, stiffness)
@@ -132,9 +139,12 @@ class Clusters:
             result += [whole] if len(whole) <= MOST_ELEMENTS else [wider[k] for k in numbers]
         return result
 
-    def _list_stiffness(self, clusters: Sequence[Cluster]) -> Iterator[tuple[Cluster, Real]]:
+    def _list_stiffness(
+        self, clusters: Sequence[Cluster], constraints: ConstraintMap | None = None
+    ) -> Iterator[tuple[Cluster, Real]]:
         """Each of the clusters with what gives tractions (2 k,), in units of the traction scale, of its pairs from
-        their jumps (2 k,), n and s of pair after pair, with all others as they are. (theory, 136)"""
+        their jumps (2 k,), n and s of pair after pair, with all others as they are; or, with the constraints of their
+        modes, with the nearest others as those follow. (theory, 136)"""
         problem, preconditioner = self._problem, self._preconditioner
         if not clusters:
             return
@@ -142,8 +152,14 @@ class Clusters:
         near = take_near(problem, preconditioner, law, self._load, [each.elements for each in clusters])
         known = np.unique(np.concatenate([each.pairs for each in clusters]))
         softness = find_softness(problem, preconditioner, self._load, known)
+        free = None if constraints is None else problem.constrain(law, self._load)
         for each in clusters:
-            formed = preconditioner.form_block(near, each.elements, problem.mesh.pairs.slave[each.pairs])
+            nodes, formed = problem.mesh.pairs.slave[each.pairs], None
+            if constraints is not None and free is not None:
+                beyond = find_nearest(problem.mesh, each.elements, self._tree, FOLLOWING)
+                formed = preconditioner.condense(constraints, free, np.union1d(each.elements, beyond), nodes)
+            if formed is None:
+                formed = preconditioner.form_block(near, each.elements, nodes)
             rows = formed.reshape(len(each.pairs), 2, -1)
             stiffness = -(softness[np.searchsorted(known, each.pairs)] @ rows)
             yield each, stiffness.reshape(2 * len(each.pairs), -1)

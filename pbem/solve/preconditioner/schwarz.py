@@ -298,7 +298,7 @@ class SchwarzPreconditioner:
         """Rows and columns (2 k, 2 k) of the tangent operator of a map `free` for some nodes of elements, all other
         unknowns of these following by the map of the constraints; None where these are not determined by that.
 
-        Of the model the elements alone are there; constraints: those of `update`. (theory, 136)
+        Of the model the elements alone are there; constraints: those of `update`. (theory, 137)
         """
         all_nodes = list_nodes(self._mesh, elements)
         around = number_components(all_nodes)

@@ -144,7 +144,7 @@ class Clusters:
     ) -> Iterator[tuple[Cluster, Real]]:
         """Each of the clusters with what gives tractions (2 k,), in units of the traction scale, of its pairs from
         their jumps (2 k,), n and s of pair after pair, with all others as they are; or, with the constraints of their
-        modes, with the nearest others as those follow. (theory, 136)"""
+        modes, with the nearest others as those follow. (theory, 136, 137)"""
         problem, preconditioner = self._problem, self._preconditioner
         if not clusters:
             return

@@ -362,9 +362,9 @@ def test_faces_that_bear_nothing_have_a_last_width_all_the_same(many_groups: Non
 
 
 def test_clusters_that_give_back_the_modes_that_there_are_do_not_count(many_groups: None) -> None:
-    def give_back(clusters: Clusters, chosen: NDArray[np.bool_], columns: int, solve: object) -> tuple[
-        Real, NDArray[np.bool_]
-    ]:
+    def give_back(
+        clusters: Clusters, chosen: NDArray[np.bool_], columns: int, solve: object, constraints: object
+    ) -> tuple[Real, NDArray[np.bool_]]:
         values = np.zeros((len(chosen), columns))
         values[:, 0], values[:, 1] = OPEN, 1.0
         return values, np.ones(len(chosen), dtype=bool)

@@ -40,7 +40,7 @@ def invert_rows(
     rows = _invert_in_single(matrix, wanted) if single and len(matrix) >= LARGE else None
     if rows is not None:
         return rows, 0
-    size, found = _find_norm(matrix), 0
+    size, found = find_norm(matrix), 0
     left, right = np.zeros((len(matrix), 0)), np.zeros((len(matrix), 0))
     for left_over in reversed(range(MOST_ROUNDS if size else 0)):
         # The transposed matrix is factorised where it is: of large groups every copy is tens of megabytes.
@@ -87,7 +87,7 @@ def _find_powers(size: Real) -> Real:
     return np.asarray(np.ldexp(1.0, np.where(np.isfinite(size), np.frexp(size)[1], 0)))
 
 
-def _find_norm(matrix: Real) -> float:
+def find_norm(matrix: Real) -> float:
     """The largest sum of sizes of the entries of a row, of some rows at a time."""
     parts = (np.abs(matrix[begin : begin + SUMMED]) for begin in range(0, len(matrix), SUMMED))
     # Of NaN no maximum would be left by Python's.

@@ -26,7 +26,7 @@ from pbem.mesh.numbering import list_nodes, number_components
 from pbem.model.material import Material
 from pbem.parallel import largest_of_parts
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
-from pbem.solve.preconditioner.inversion import SINGULAR, invert_rows
+from pbem.solve.preconditioner.inversion import SINGULAR, find_norm, invert_rows
 from pbem.solve.preconditioner.local_operator import LocalOperator
 from pbem.solve.preconditioner.near_map import NearMap, take_near
 from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
@@ -314,11 +314,13 @@ class SchwarzPreconditioner:
         block = self._local.form(elements, around, at, at, loose, None)
         if len(left):
             matrix = self._local.form(elements, around, rows, left, near, less)
-            size = float(np.abs(matrix).sum(axis=0).max())
-            factors, pivots, zero = lapack.dgetrf(matrix)
+            size = find_norm(matrix)
+            # The transposed matrix is factorised where it is: a copy would be a hundred megabytes.
+            factors, pivots, zero = lapack.dgetrf(matrix.T, overwrite_a=True)
             if zero or not lapack.dgecon(factors, size)[0] > SINGULAR:
                 return None
-            follows = lapack.dgetrs(factors, pivots, self._local.form(elements, around, rows, at, loose, less))[0]
+            forces = self._local.form(elements, around, rows, at, loose, less)
+            follows = lapack.dgetrs(factors, pivots, forces, trans=1)[0]
             block -= self._local.form(elements, around, at, left, near, None) @ follows
         place = np.searchsorted(at, asked)
         return np.asarray(block[np.ix_(place, place)])

@@ -36,9 +36,10 @@ NEIGHBOURS = 16
 MOST_ELEMENTS = 80
 # Elements around a cluster, as a multiple of its own, and at least.
 AROUND, LEAST_AROUND = 1.0, 32
-# So few clusters are solved for with so many elements beyond that follow in the modes that they have. What is left at
-# the end are contacts that a crack slides along: their tractions follow from where all of it slides to.
-MOST_FOLLOWED, FOLLOWING = 6, 400
+# Up to so many clusters are solved for with so many elements beyond each that follow in the modes that they have. What
+# is left at the end are contacts that a crack slides along, or a block turns on: their tractions follow from where all
+# of that moves to.
+FOLLOWING = ((2, 700), (6, 400), (200, 250))
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,8 @@ class Clusters:
         formed = self.form(chosen)
         found = np.zeros((len(chosen), columns + 1))
         with clock.piece("clusters"):
-            following = constraints if len(formed) <= MOST_FOLLOWED else None
-            own = self._list_stiffness(formed[comm.rank :: comm.size], following)
+            beyond = next((number for most, number in FOLLOWING if len(formed) <= most), 0)
+            own = self._list_stiffness(formed[comm.rank :: comm.size], constraints if beyond else None, beyond)
             for _ in range(0, len(formed), comm.size):
                 for each, stiffness in islice(own, 1):  # none on the last ranks in the last round
                     values = solve(each.pairs, stiffness)
@@ -140,11 +141,11 @@ class Clusters:
         return result
 
     def _list_stiffness(
-        self, clusters: Sequence[Cluster], constraints: ConstraintMap | None = None
+        self, clusters: Sequence[Cluster], constraints: ConstraintMap | None = None, following: int = 0
     ) -> Iterator[tuple[Cluster, Real]]:
         """Each of the clusters with what gives tractions (2 k,), in units of the traction scale, of its pairs from
         their jumps (2 k,), n and s of pair after pair, with all others as they are; or, with the constraints of their
-        modes, with the nearest others as those follow. (theory, 136, 137)"""
+        modes, with so many of the nearest elements following by these. (theory, 136, 137)"""
         problem, preconditioner = self._problem, self._preconditioner
         if not clusters:
             return
@@ -156,7 +157,7 @@ class Clusters:
         for each in clusters:
             nodes, formed = problem.mesh.pairs.slave[each.pairs], None
             if constraints is not None and free is not None:
-                beyond = find_nearest(problem.mesh, each.elements, self._tree, FOLLOWING)
+                beyond = find_nearest(problem.mesh, each.elements, self._tree, following)
                 formed = preconditioner.condense(constraints, free, np.union1d(each.elements, beyond), nodes)
             if formed is None:
                 formed = preconditioner.form_block(near, each.elements, nodes)

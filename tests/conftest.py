@@ -8,10 +8,6 @@ from typing import Any
 
 import pytest
 
-from pbem import driver
-from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model
-from pbem.results.estimator import Estimator
 from tests.parallel.launch import launch, launch_snippet
 
 
@@ -31,8 +27,12 @@ def mpirun_snippet() -> Callable[..., subprocess.CompletedProcess[str]]:
 def without_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs in this process have no second solution, which takes a third of a small one: for tests that look at no
     estimated errors."""
+    # Imported here: what it starts of MPI leaves variables in the environment, which the processes of the tests would
+    # take for those of a launcher.
+    from pbem import driver
+    from pbem.results.estimator import Estimator
 
-    def make_none(model: Model, mesh: Mesh, *_: Any) -> Estimator:
+    def make_none(model: Any, mesh: Any, *_: Any) -> Estimator:
         return Estimator(model, mesh, None, None)
 
     monkeypatch.setattr(driver, "make_estimator", make_none)

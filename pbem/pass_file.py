@@ -46,11 +46,12 @@ def write_pass(file: PassFile, comm: Comm, work: Callable[[ResultWriter | None],
         # While the first rank writes what the file begins with the others derive what it needs with the first step.
         derived = _derive_tip_forms(file, comm)
         output = do_on_first(comm, PbemError, lambda: _open(file, comm.size), share=False) or PassOutput()
-        for each in comm.gather(derived, root=0) or ():
-            expect_writer(output.writer).tip_rules.take(each)
     if output.writer:
         output.writer.notes = file.notes
     try:  # from here on whatever happens has to leave a closed file
+        with clock.piece("writing"):
+            for each in comm.gather(derived, root=0) or ():
+                expect_writer(output.writer).tip_rules.take(each)
         found = work(output.writer)
     except BaseException as error:
         first = one.number == 1 or one.spare or file.target.resume

@@ -42,6 +42,8 @@ def read_csv(path: Path, text: str) -> Reading:
         reading.blame(f"line {rows[0][0]}", found, EXPECTED)
         raise fail(path, reading.faults)
     if columns is not None:
+        if "order" in columns and not _numbers_all(rows[1:], columns["order"]):
+            del columns["order"]  # something else is meant
         _tell_unread(rows[0][1], columns, reading)
         width, rows = len(header), rows[1:]
     else:
@@ -100,6 +102,11 @@ def _read_header(names: list[str]) -> dict[str, int] | None:
                 columns[key] = found
         return columns
     return None
+
+
+def _numbers_all(rows: list[tuple[int, list[str]]], column: int) -> bool:
+    """Whether a column has a number in every row."""
+    return all(column < len(cells) and _parse(cells[column]) is not None for _, cells in rows)
 
 
 def _tell_unread(names: list[str], columns: dict[str, int], reading: Reading) -> None:
@@ -161,19 +168,28 @@ def _read_segments(rows: list[tuple[int, list[str]]], columns: dict[str, int], r
         reading.traces.append(Trace(name, f"line {line}", (draw_line([start, end]),)))
 
 
+def _check_order(along: list[tuple[int, float]], reading: Reading) -> None:
+    """Blame the last of the vertices of a part, by line and number, where the numbers turn back: a trace may have been
+    drawn from either end."""
+    if len(along) > 2 and (along[1][1] - along[0][1]) * (along[2][1] - along[1][1]) < 0:
+        (line, number), before = along[2], along[1][1]
+        reading.blame(f"line {line}, order", f"{number:g} after {before:g}", "vertices in order along a trace")
+
+
 def _read_vertices(rows: list[tuple[int, list[str]]], columns: dict[str, int], reading: Reading) -> None:
     """Successive rows of one name, and of one part if there is a column of these, are a part of its trace."""
     parts: dict[str, list[tuple[int, list[complex]]]] = {}
-    last, last_part, place = None, "", -math.inf
+    last, last_part = None, ""
+    along: list[tuple[int, float]] = []  # lines and order of the present part's vertices
     for line, cells in rows:
         x, y = (_read_cell(cells, columns[key], key, line, reading) for key in ("x", "y"))
         name = cells[columns["id"]] if columns["id"] < len(cells) else ""
         part = cells[columns["part"]] if "part" in columns and columns["part"] < len(cells) else ""
-        before = place if (name, part) == (last, last_part) else -math.inf
+        along = along if (name, part) == (last, last_part) else []
         number = _read_cell(cells, columns["order"], "order", line, reading) if "order" in columns else None
-        if number is not None and number < before:
-            reading.blame(f"line {line}, order", f"{number:g} after {before:g}", "vertices in order along a trace")
-        place = before if number is None else number
+        if number is not None:
+            _check_order([*along[-2:], (line, number)], reading)
+            along.append((line, number))
         if not name or not name.isprintable():
             reading.blame(f"line {line}, id", show(name), "the name of a trace")
         if x is None or y is None:

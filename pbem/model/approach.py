@@ -16,7 +16,7 @@ from pbem.geometry.sampling import sample_side
 from pbem.linear_programme import SOLVED, minimise
 from pbem.model.model import Contact, Interface, Law, Model
 from pbem.model.resultants import measure_power
-from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes
+from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes, touches
 from pbem.model.sight import OVERLAP, Obstacles
 from pbem.model.touching import find_foot
 from pbem.model.varying import Places, Varying, evaluate
@@ -59,7 +59,8 @@ def find_closing(model: Model) -> frozenset[str]:
     if moved is None:
         return frozenset()
     closed = moved <= CLOSED * max(float(opening.max()), CLOSED * model.size)
-    return frozenset(name for name, touches in zip(names, closed.tolist(), strict=True) if touches)
+    stopping = {name for name, stops in zip(names, closed.tolist(), strict=True) if stops}
+    return frozenset(name for name in stopping if not touches(model, apart[name]))
 
 
 def _sample_openings(

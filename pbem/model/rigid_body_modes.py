@@ -78,7 +78,7 @@ def find_rigid_body_modes(model: Model, ties: Mapping[str, Tie | PairTie] | None
 def list_hold(model: Model) -> Hashable:
     """All that the rigid motions of `find_rigid_body_modes` depend on in any stage, to compare models by: where laws
     differ by numbers alone, or loads do, it is equal."""
-    joints = [(joint.name, curve, first, second, default_tie(joint.law, _touches(model, joint)))
+    joints = [(joint.name, curve, first, second, default_tie(joint.law, touches(model, joint)))
               for joint, curve, first, second in _list_joints(model)]
     conditions = [(name, each.frame, each.known, each.stiffness) for name, each in model.conditions.items()]
     built = [(tuple(stage.construction.joints.items()), stage.construction.removed) for stage in model.stages]
@@ -206,7 +206,7 @@ def _link_regions(
     """What interfaces and contacts demand of the difference of two regions' motions, on the (first) curve's points."""
     numbers = {name: number for number, name in enumerate(names)}
     for joint, curve, first, second in _list_joints(model):
-        tie = ties.get(joint.name) or default_tie(joint.law, _touches(model, joint))
+        tie = ties.get(joint.name) or default_tie(joint.law, touches(model, joint))
         if first == second or tie == "none":
             continue
         if isinstance(tie, PairTie):
@@ -225,7 +225,8 @@ def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> Real:
     return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
-def _touches(model: Model, joint: Interface | Contact) -> bool:
+def touches(model: Model, joint: Interface | Contact) -> bool:
+    """Whether the faces of a joint touch somewhere at the start, or are known to be closed by what moves them."""
     if joint.name in model.closing:
         return True
     if isinstance(joint, Interface) and not isinstance(joint.law.gap, Varying):

@@ -202,6 +202,16 @@ def test_parts_and_order_of_vertices_are_those_of_their_columns() -> None:
     }
 
 
+@pytest.mark.parametrize(("order", "read"), [
+    (["3", "2", "1"], True), (["first", "second", "third"], False), (["1", "", "3"], False),
+])
+def test_an_order_may_fall_and_what_is_none_is_not_read(order: list[str], read: bool, capsys: Capture) -> None:
+    rows = [f"a,{x},0,{each}" for x, each in enumerate(order)]
+    tables = bring_in("map.csv", "\n".join(["id,x,y,order", *rows]))
+    assert tables["curves"]["a"]["points"] == [[0, 0], [1, 0], [2, 0]]
+    assert ("order" in capsys.readouterr().out) != read
+
+
 def test_traces_that_would_be_pieces_of_none_are_told_apart(capsys: Capture) -> None:
     # By what ends in a number, 1.1 and 1.2 would be the trace 1 in tables, pictures and laws.
     tables = bring_in("map.csv", "id,x1,y1,x2,y2\n1.1,0,0,2,0\n1.2,0,1,2,1\n2.10,0,2,2,2\n2.10a,0,3,2,3\n")

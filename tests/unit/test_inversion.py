@@ -66,6 +66,14 @@ def test_what_single_precision_cannot_invert_is_inverted_in_double(singular: int
     np.testing.assert_allclose(matrix @ found @ matrix, matrix, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("scale", [1e200, 1e-200])
+def test_what_single_precision_has_no_room_for_is_kept_in_double(scale: float) -> None:
+    matrix = draw_matrix(210, 0, scale)
+    found, _ = invert_rows(matrix.copy(), np.eye(210), matrix.copy, single=True)
+    assert found is not None and found.dtype == np.float64
+    np.testing.assert_allclose(found @ matrix, np.eye(210), rtol=0, atol=1e-10)
+
+
 @pytest.mark.parametrize("single", [False, True])
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
 def test_large_matrices_without_an_inverse(value: float, single: bool) -> None:

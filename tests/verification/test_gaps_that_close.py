@@ -82,3 +82,26 @@ def test_a_force_that_leads_away_from_the_gap_is_still_refused(tmp_path: Path) -
     case["boundary"]["top"] = {"tn": 0.2}
     with pytest.raises(pbem.CaseError, match="free rigid motion"):
         pbem.run(case, tmp_path / "case.h5")
+
+
+def test_what_touches_from_the_start_is_not_said_to_be_closed_by_the_loads(tmp_path: Path) -> None:
+    """A block rests with friction on another; a third one comes down on it."""
+    sides = {
+        "foot": [[0, 0], [1, 0]], "right": [[1, 0], [1, 1]], "seat": [[1, 1], [0, 1]], "left": [[0, 1], [0, 0]],
+        "east": [[1, 1], [1, 2]], "crown": [[1, 2], [0, 2]], "west": [[0, 2], [0, 1]], "base": [[0, 2.1], [1, 2.1]],
+        "side": [[1, 2.1], [1, 3]], "top": [[1, 3], [0, 3]], "guide": [[0, 3], [0, 2.1]],
+    }
+    results = pbem.run({
+        "materials": {"stone": {"young": 1e3, "poisson": 0.2}},
+        "curves": {name: {"points": points, "elements": 4} for name, points in sides.items()},
+        "regions": {"lower": {"material": "stone", "boundary": ["foot", "right", "seat", "left"]},
+                    "middle": {"material": "stone", "boundary": ["seat", "east", "crown", "west"]},
+                    "upper": {"material": "stone", "boundary": ["base", "side", "top", "guide"]}},
+        "interfaces": {"seat": {"law": "coulomb", "friction": 0.5}},
+        "contacts": {"joint": {"between": ["crown", "base"], "law": "coulomb", "friction": 0.5}},
+        "boundary": {"foot": {"ux": 0.0, "uy": 0.0}, "guide": {"un": 0.0}, "top": {"pressure": 0.2}},
+        "analysis": {"steps": 1},
+    }, tmp_path / "case.h5")
+    said = [note for note in results.notes if "does not touch yet" in note]
+    assert len(said) == 1 and "'joint'" in said[0] and "'seat'" not in said[0]
+    assert results.reactions["foot"][-1][1] == pytest.approx(0.2, rel=1e-3)  # of four elements

@@ -79,7 +79,8 @@ def _invert_in_single(matrix: Real, wanted: Real) -> Single | None:
             return None
         found = lapack.sgetrs(factors, pivots, (wanted / column).astype(np.float32).T, overwrite_b=True)[0].T
         result: Single = (found / row).astype(np.float32)
-    return result if np.isfinite(result).all() else None
+    lost = result.any(axis=1) != found.any(axis=1)  # of which nothing but zeros is left
+    return result if np.isfinite(result).all() and not lost.any() else None
 
 
 def _find_powers(size: Real) -> Real:

@@ -38,8 +38,8 @@ MOST_ELEMENTS = 80
 AROUND, LEAST_AROUND = 1.0, 32
 # Up to so many clusters are solved for with so many elements beyond each that follow in the modes that they have. What
 # is left at the end are contacts that a crack slides along, or a block turns on: their tractions follow from where all
-# of that moves to.
-FOLLOWING = ((2, 700), (6, 400), (200, 250))
+# of that moves to. Of order 2; of others as many nodes.
+FOLLOWING = ((2, 500), (6, 400), (200, 250))
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,7 @@ class Clusters:
         found = np.zeros((len(chosen), columns + 1))
         with clock.piece("clusters"):
             beyond = next((number for most, number in FOLLOWING if len(formed) <= most), 0)
+            beyond = 3 * beyond // (problem.mesh.order + 1)
             own = self._list_stiffness(formed[comm.rank :: comm.size], constraints if beyond else None, beyond)
             for _ in range(0, len(formed), comm.size):
                 for each, stiffness in islice(own, 1):  # none on the last ranks in the last round

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
+Single = NDArray[np.float32]
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
 Bool = NDArray[np.bool_]

@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Integer, Real, Single
 from pbem.bem import _expansions
-
-Single = NDArray[np.float32]
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,9 @@ NEIGHBOUR_UNKNOWNS, NEIGHBOUR_SHARE = 100, 0.5
 # with these; parts of 32 elements take 15 iterations for the 9 of kb11.
 PART_ELEMENTS, PART_SHARE = 48, 1.0
 
+# Unknowns at most of a cluster of a network that settles by itself, and of the elements that follow it: their matrix.
+MOST_CONDENSED = 4000
+
 
 def join_elements(mesh: Mesh, own: Integer) -> Integer:
     """Of every element the number of the first one of its set, where some of them (k,) are connected.

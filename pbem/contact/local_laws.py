@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from pbem.arrays import Bool, Integer, Real
-from pbem.bem.combinations import Single, combine_pairs
+from pbem.arrays import Bool, Integer, Real, Single
+from pbem.bem.combinations import combine_pairs
 
 
 def solve_laws(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Real
+from pbem.bem.group_sizes import MOST_CONDENSED
 from pbem.bem.near import LARGE
 from pbem.contact.laws import find_joint
 from pbem.forecast.calibration import Speed
@@ -155,7 +156,7 @@ def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, fl
     if work.hierarchical:
         near = PACKED_MEMORY if work.unknowns >= LARGE else NEAR_MEMORY
         everywhere = EVERYWHERE_FAR if steps == 1 else EVERYWHERE_FAR_STEPS
-        at_once = min(ranks, work.groups.count) * 8 * work.groups.largest
+        at_once = max(min(ranks, work.groups.count) * 8 * work.groups.largest, ranks * _measure_cluster(work))
         settling = {SETTLING: 4 * work.settling} if work.settling else {}
         return {"operator": 8 * near * work.entries, "preconditioner": 8 * (inverses + work.groups.kept), **settling,
                 "mesh and vectors": everywhere * ranks * work.unknowns,
@@ -174,7 +175,14 @@ def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, fl
 
 def measure_beside(work: Work) -> float:
     """Bytes that one rank has at most of what `list_memory` calls BESIDE; none with the dense operator."""
-    return max(FIRST + FIRST_UNKNOWN * work.unknowns, 8 * work.groups.largest) if work.hierarchical else 0.0
+    if not work.hierarchical:
+        return 0.0
+    return max(FIRST + FIRST_UNKNOWN * work.unknowns, 8 * work.groups.largest, _measure_cluster(work))
+
+
+def _measure_cluster(work: Work) -> float:
+    """Bytes of the matrix of a cluster that settles by itself, with what follows it."""
+    return 8.0 * min(work.unknowns, MOST_CONDENSED) ** 2 if work.settling else 0.0
 
 
 def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Changes) -> dict[str, float]:

@@ -189,7 +189,8 @@ def _read_vertices(rows: list[tuple[int, list[str]]], columns: dict[str, int], r
         number = _read_cell(cells, columns["order"], "order", line, reading) if "order" in columns else None
         if number is not None:
             _check_order([*along[-2:], (line, number)], reading)
-            along.append((line, number))
+            if not along or number != along[-1][1]:
+                along.append((line, number))
         if not name or not name.isprintable():
             reading.blame(f"line {line}, id", show(name), "the name of a trace")
         if x is None or y is None:

@@ -47,8 +47,8 @@ class CrackTips(Mapping[str, Tips]):
     """The tips of cracks by name, and of interfaces that end as a crack does.
 
     The name of a trace that was cut into pieces (`t12` of `t12.1`, `t12.2`, ...) gives those of the trace: at the start
-    of its first piece and the end of the last one. The names that are listed, counted and asked for with `in` are those
-    of the pieces.
+    of its first piece and the end of the last one (of an interface, of those that end as a crack does). The names that
+    are listed, counted and asked for with `in` are those of the pieces.
     """
 
     def __init__(self, tips: Mapping[str, Tips]) -> None:

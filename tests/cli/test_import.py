@@ -457,6 +457,7 @@ def test_an_arc_of_a_drawing_that_turns_by_360_degrees_is_a_circle(first: float)
     ("map.csv", "0,0,1,1\n0,5,1,1,2\n", "line 2: found a row of 5; expected 4 columns"),
     ("map.csv", "id,x,y\na,0,0\na,1,5,2\n", "line 3: found a row of 4; expected 3 columns"),
     ("map.csv", "id,order,x,y\na,1,0,0\na,3,2,0\na,2,1,1\n", "line 4, order: found 2 after 3"),
+    ("map.csv", "id,order,x,y\na,2,0,0\na,1,1,0\na,1,2,0\na,2,3,0\n", "line 5, order: found 2 after 1"),
     ("map.csv", "0,0,1,x\n", "line 1, y2: found \"x\""),
     ("map.csv", "id,x,y\na,0,inf\n", "line 2, y: found \"inf\""),
     ("map.dxf", "no drawing", "the file: found what ezdxf cannot read"),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Integer, Real, Single
 
 # Singular values below this part of the matrix' norm are rounding.
 SINGULAR = 1e-13
@@ -25,8 +25,6 @@ SUMMED = 64
 # factors save time from so many rows on.
 WELL_CONDITIONED = 1e-4
 LARGE = 200
-
-Single = NDArray[np.float32]
 
 
 def invert_rows(

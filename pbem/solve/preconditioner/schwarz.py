@@ -12,10 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Integer, Real, Single
 from pbem.bem.group_sizes import MOST_LEFT_OF_BODIES, MOST_TIMES
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.clock import clock
@@ -31,8 +30,6 @@ from pbem.solve.preconditioner.local_operator import LocalOperator
 from pbem.solve.preconditioner.near_map import NearMap, take_near
 from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
 from pbem.solve.system.halo import place_unknowns
-
-Single = NDArray[np.float32]
 
 # Unknowns that are left in the matrix of a group of cracks and the nearest elements around it, at most.
 MOST_LEFT = 900

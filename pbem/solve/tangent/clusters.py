@@ -19,6 +19,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.bem.group_sizes import MOST_CONDENSED
 from pbem.clock import clock
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.deferred_laws import free_jumps
@@ -36,10 +37,10 @@ NEIGHBOURS = 16
 MOST_ELEMENTS = 80
 # Elements around a cluster, as a multiple of its own, and at least.
 AROUND, LEAST_AROUND = 1.0, 32
-# Up to so many clusters are solved for with so many elements beyond each that follow in the modes that they have. What
-# is left at the end are contacts that a crack slides along, or a block turns on: their tractions follow from where all
-# of that moves to. Of order 2; of others as many nodes.
-FOLLOWING = ((2, 500), (6, 400), (200, 250))
+# Up to so many clusters are solved for with the elements beyond each, in all so many unknowns, which follow in the
+# modes that they have. What is left at the end are contacts that a crack slides along, or a block turns on: their
+# tractions follow from where all of that moves to.
+FOLLOWING = ((2, MOST_CONDENSED), (6, 3000), (200, 2000))
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,6 @@ class Clusters:
         found = np.zeros((len(chosen), columns + 1))
         with clock.piece("clusters"):
             beyond = next((number for most, number in FOLLOWING if len(formed) <= most), 0)
-            beyond = 3 * beyond // (problem.mesh.order + 1)
             own = self._list_stiffness(formed[comm.rank :: comm.size], constraints if beyond else None, beyond)
             for _ in range(0, len(formed), comm.size):
                 for each, stiffness in islice(own, 1):  # none on the last ranks in the last round
@@ -146,7 +146,7 @@ class Clusters:
     ) -> Iterator[tuple[Cluster, Real]]:
         """Each of the clusters with what gives tractions (2 k,), in units of the traction scale, of its pairs from
         their jumps (2 k,), n and s of pair after pair, with all others as they are; or, with the constraints of their
-        modes, with so many of the nearest elements following by these. (theory, 136, 137)"""
+        modes, with the nearest others following by these, so many unknowns in all. (theory, 136, 137)"""
         problem, preconditioner = self._problem, self._preconditioner
         if not clusters:
             return
@@ -158,7 +158,9 @@ class Clusters:
         for each in clusters:
             nodes, formed = problem.mesh.pairs.slave[each.pairs], None
             if constraints is not None and free is not None:
-                beyond = find_nearest(problem.mesh, each.elements, self._tree, following)
+                width = 2 * (problem.mesh.order + 1)
+                number = following // width - len(each.elements)
+                beyond = find_nearest(problem.mesh, each.elements, self._tree, max(number, 0))
                 formed = preconditioner.condense(constraints, free, np.union1d(each.elements, beyond), nodes)
             if formed is None:
                 formed = preconditioner.form_block(near, each.elements, nodes)

@@ -8,10 +8,9 @@ smaller, and their stiffness is stored: another law only weighs its columns.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Integer, Real, Single
 from pbem.clock import clock
 from pbem.contact.modes import Linearisation
 from pbem.mesh.numbering import number_components
@@ -19,8 +18,6 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.system.halo import place_unknowns
 from pbem.solve.tangent.nearby import answers_nearby
 from pbem.solve.tangent.sweeps import Parts
-
-Single = NDArray[np.float32]
 
 
 class PartInverses:

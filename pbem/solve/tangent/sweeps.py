@@ -16,14 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real, Single
 from pbem.bem.group_sizes import PART_ELEMENTS, PART_SHARE
 from pbem.contact.complementarity import Subset, take_subset
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.deferred_laws import free_jumps
 from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
-from pbem.contact.local_laws import Single, solve_laws
+from pbem.contact.local_laws import solve_laws
 from pbem.contact.modes import Linearisation, linearise
 from pbem.heap import give_back
 from pbem.mesh.mesh import Mesh

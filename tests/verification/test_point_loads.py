@@ -13,7 +13,9 @@ import pytest
 import pbem
 from pbem.arrays import Complex, Real
 from pbem.errors import ResultFileError
+from pbem.geometry.curve import Leg
 from pbem.model.build import build_model
+from pbem.model.point_loads import find_acted_on
 from pbem.results.reader import Results
 
 pytestmark = pytest.mark.usefixtures("without_errors")
@@ -427,6 +429,45 @@ def test_a_slender_beam_under_a_force_on_its_top(
     for name, part in (("left", 1 - at / length), ("right", at / length)):
         reaction = complex(*results.reactions[name][-1]) * np.conj(turn / unit)
         assert abs(reaction - 1j * part) < allowed, name
+
+
+@pytest.mark.parametrize(("sides", "center", "turn"), [(48, 0j, 1 + 0j), (60, 3e4 - 2e4j, 40 * np.exp(0.3j))])
+def test_nearly_straight_sides_that_are_loaded_at_their_corners(
+    sides: int, center: complex, turn: complex, tmp_path: Path
+) -> None:
+    """A hole of which every corner is pushed outwards keeps its elements; displacements as with four times as many."""
+    corners = np.exp(2j * np.pi * np.arange(sides) / sides)
+    force = (1 + 0.5 * corners.real**2) * corners * turn * 2 * np.pi / sides
+
+    def make_case(elements: int) -> dict[str, Any]:
+        return {
+            "materials": {"rock": {"young": 1e3, "poisson": 0.25}},
+            "curves": {"hole": {"points": to_pairs(center + turn * np.append(corners, 1.0)), "elements": elements}},
+            "regions": {"plane": {"material": "rock", "infinite": True, "boundary": ["hole"]}},
+            "point_loads": {f"p{k}": {"at": to_pairs([center + turn * corners[k]])[0], "fx": float(force[k].real),
+                                      "fy": float(force[k].imag)} for k in range(sides)},
+            "analysis": {"steps": 1},
+        }  # fmt: skip
+
+    moved = []
+    points = to_pairs(center + turn * np.array([1.2, -2.4 + 3.2j, -1.5j]))
+    for elements in (sides, 4 * sides):
+        case = make_case(elements)
+        hole = build_model(pbem.Case(**case)).curves["hole"]
+        assert sum(leg.elements for leg in hole.legs) == elements
+        moved.append(pbem.run(case, tmp_path / f"{elements}.h5").evaluate(points).displacement[-1])
+    assert np.abs(moved[0] - moved[1]).max() < 3e-4 * np.abs(moved[1]).max()
+
+
+def test_legs_that_a_load_on_the_boundary_acts_on() -> None:
+    """All but those that end there or lead through or past it, however small a long leg beside it looks."""
+    at = 2 - 1j
+    acted = [Leg(at - 9 - 0.5j, at + 11 - 0.5j, 1), Leg(at + 2 + 0.5j, at + 3 + 0.5j, 1),
+             Leg(at + 1 - 1j, at + 1 + 1j, 1, center=at + 1 + 0j, sweep=np.pi),
+             Leg(at + 1 + 0j, at + 1 + 0j, 4, center=at + 1 - 1j, sweep=-2 * np.pi)]  # fmt: skip
+    free = [Leg(at, at + 1j, 1), Leg(at - 2j, at, 1), Leg(at + 1 + 1j, at + 3 + 3j, 1), Leg(at + 1, at + 2 + 0.1j, 1),
+            Leg(at, at + 2, 1, center=at + 1, sweep=np.pi)]  # fmt: skip
+    assert find_acted_on([*acted, *free], at).tolist() == [True] * len(acted) + [False] * len(free)
 
 
 def make_plate(loads: int, grading: str) -> pbem.Case:

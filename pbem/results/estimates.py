@@ -23,6 +23,7 @@ from pbem.results.rates import (
     list_factor_shares,
     list_force_shares,
 )
+from pbem.results.short_zones import bound_short_zones
 from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
@@ -110,8 +111,9 @@ class Comparison:
         """as_they_are: differences are not divided: with a run that is exact they are the errors of the other one.
         rules: of the run's tips, if they are known."""
         self._model, self._mesh, self._beside = model, mesh, beside
-        self._interfaces = list(sort_pairs(mesh).values())
-        self._known = rules
+        self._sorted = sort_pairs(mesh)
+        self._interfaces = list(self._sorted.values())
+        self._known, self._as_they_are = rules, as_they_are
         self._absence = Absence(model, mesh, np.zeros(0, dtype=np.int64))
         # A stiff region goes along with a soft one: the energy of that is none of its own.
         self._modulus = np.array([region.material.plane_modulus for region in model.regions])[mesh.region]
@@ -186,7 +188,7 @@ class Comparison:
             energy = measure_energy(self._model, self._mesh, self._beside, step, second)
             estimates = self._subtract(step, second, self._beside, energy)
             self.energy = np.maximum(self.energy, energy)
-            self.jumps = np.maximum(self.jumps, self._locate_jumps(step.contact, second.contact, self._beside))
+            self.jumps = np.maximum(self.jumps, self._locate_jumps(step, second, self._beside))
         return estimates, self._relate(estimates)
 
     def _know_nothing(self) -> Estimates:
@@ -204,6 +206,9 @@ class Comparison:
         forces = sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second)
         forces = forces / of_forces
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)
+        least_jumps = self._bound_jumps(step)
+        of_zones = [least_jumps[own].max(axis=0) for own in self._interfaces]
+        opening, slip = np.maximum([opening, slip], np.reshape(of_zones, (-1, 2)).T)
         both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
         cracks = len(self._model.crack_tips)  # the two meshes need not see the same cracks along interfaces
         factors = [np.abs(mine[:cracks] - other[:cracks]) / of_factors for mine, other in zip(*both, strict=True)]
@@ -214,6 +219,13 @@ class Comparison:
             np.abs(np.stack([forces.real, forces.imag], axis=1)), opening, slip, traction_n, traction_s, KI, KII,
             by * _largest(np.abs(moved[~beside.mesh.node_crack])),
         )
+
+    def _bound_jumps(self, step: Step) -> Real:
+        """The least errors (m, 2) of opening and slip at the run's pairs."""
+        contact = self._absence.blank(replace(step, interior=None)).contact
+        if self._as_they_are:
+            return np.zeros((len(contact.slip), 2))
+        return bound_short_zones(self._model, self._sorted, contact.opening - self._gap, contact.slip)
 
     def _bound_factors(self, contact: ContactState, jumps: Real) -> Real:
         """The least error (cracks, 1) of the factors of each crack for the errors (i,) of the interfaces' jumps."""
@@ -277,7 +289,7 @@ class Comparison:
 
         return subtract("traction_n"), subtract("traction_s")
 
-    def _locate_jumps(self, mine: ContactState, other: ContactState, beside: Beside) -> Real:
+    def _locate_jumps(self, step: Step, second: Step, beside: Beside) -> Real:
         """Estimated error of the jumps on each element of the run (e,), over the largest jump so far.
 
         The mean over each coarse element is left out: it comes from elsewhere.
@@ -286,8 +298,10 @@ class Comparison:
         element = beside.carry.nearest[pairs.slave] // (self._mesh.order + 1)
         own, of = np.unique(pairs.slave // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
+            least = self._bound_jumps(step).max(axis=1) / self.scales.jumps
+            np.maximum.at(result, self._mesh.pairs.slave // (self._mesh.order + 1), least)
             for name in JUMPS:
-                errors = self._divide_jumps(name, mine, other, beside) / self.scales.jumps
+                errors = self._divide_jumps(name, step.contact, second.contact, beside) / self.scales.jumps
                 mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
                 errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
                 np.maximum.at(result, element, np.abs(errors))

@@ -1,0 +1,74 @@
+"""Estimated errors of slips on so few pairs that the second solution may slip alike by chance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.geometry.curve import Curve, Leg
+from pbem.model.model import Model
+from pbem.results.short_zones import MOST, PART, bound_short_zones
+
+
+def make_block(order: int, times: int, unit: float, stress: float) -> dict[str, Any]:
+    """A block on a slope of 22 degrees, held by friction: it rests under its weight, is pushed at its lower end and
+    let go; one of its corners slips."""
+    turn = np.exp(1j * np.deg2rad(22.0))
+    high = float(2 * np.tan(np.deg2rad(22.0)))
+    sides = {
+        "foot": (-2 - 2j, 2 - 2j, 8), "right": (2 - 2j, 2 + high * 1j, 6),
+        "slope": (2 + high * 1j, -2 - high * 1j, 16), "left": (-2 - high * 1j, -2 - 2j, 6),
+        "seat": (-0.6 * turn, 0.6 * turn, 8), "upper": (0.6 * turn, (0.6 + 0.6j) * turn, 5),
+        "top": ((0.6 + 0.6j) * turn, (-0.6 + 0.6j) * turn, 6), "lower": ((-0.6 + 0.6j) * turn, -0.6 * turn, 5),
+    }  # fmt: skip
+    weight = 1e-3 * stress / unit
+    return {
+        "materials": {"rock": {"young": stress, "poisson": 0.24, "density": weight},
+                      "steel": {"young": 2.7 * stress, "poisson": 0.4, "density": weight}},
+        "curves": {name: {"points": [[float((unit * at).real), float((unit * at).imag)] for at in (start, end)],
+                          "elements": times * count} for name, (start, end, count) in sides.items()},
+        "regions": {"base": {"material": "rock", "boundary": ["foot", "right", "slope", "left"]},
+                    "block": {"material": "steel", "boundary": ["seat", "upper", "top", "lower"]}},
+        "boundary": {"foot": {"ux": 0.0, "uy": 0.0}, "upper": {"tn": 0.0, "ts": 0.0}},
+        "contacts": {"joint": {"between": ["seat", "slope"], "friction": 0.8}},
+        "analysis": {"order": order},
+        "stages": [{"steps": 1, "gravity": {"gy": -1.0}}, {"steps": 2, "boundary": {"upper": {"tn": -1e-4 * stress}}},
+                   {"steps": 1, "boundary": {"upper": {"tn": 0.0}}}],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("order", "unit", "stress"), [(1, 1.0, 1.0), (2, 1e3, 1e7), (3, 1e-6, 1.0)])
+def test_a_corner_that_slips(order: int, unit: float, stress: float, tmp_path: Path) -> None:
+    """Against four times the elements, while it slips and when it has come to rest with its slip."""
+    results = pbem.run(make_block(order, 1, unit, stress), tmp_path / "block.h5")
+    finer = pbem.run(make_block(2, 4, unit, stress), tmp_path / "finer.h5")
+    slips, true = (np.abs(each.contact["joint"].slip).max(axis=1) for each in (results, finer))
+    for step in (2, 3):
+        assert np.count_nonzero(results.contact["joint"].slip[step]) <= MOST
+        error = abs(slips[step] - true[step])
+        assert 0.3 < error / results.errors.slip["joint"][step] < 3.0
+        assert 0.3 < error / true[step] / results.errors.relative["jumps"][step] < 3.0
+
+
+def test_zones_that_are_short() -> None:
+    """Between pairs that stay: not all of an interface, nor what goes on on the next one, unless others meet there."""
+    curves = {"one": (0j, 1 + 0j), "next": (1 + 0j, 2 + 1j), "far": (5 + 0j, 6 + 0j), "short": (9 + 0j, 10 + 0j)}
+    model = cast(Model, SimpleNamespace(
+        curves={name: Curve(name, (Leg(*ends, 3),)) for name, ends in curves.items()}, interfaces=curves))
+    interfaces = {name: np.arange(9 * k, 9 * k + 9) for k, name in enumerate(curves)}
+    interfaces["short"] = np.arange(27, 30)
+    slip, opening = np.zeros(30), np.zeros(30)
+    slip[[0, 1]], slip[[7, 8, 9, 10]], slip[20], opening[21], slip[24:27], slip[27:] = -3e-3, 1.0, -2.0, 1e-3, 4.0, 1.0
+    least = bound_short_zones(model, interfaces, opening, slip)
+    expected = np.zeros((30, 2))
+    expected[:2, 1], expected[24:27, 1] = PART / 2 * 3e-3, PART / 3 * 4
+    expected[20:22] = PART / 2 * np.array([1e-3, 2.0])
+    np.testing.assert_allclose(least, expected)
+    slip[9:11] = 0.0  # the next one stays together
+    expected[7:9, 1] = PART / 2
+    np.testing.assert_allclose(bound_short_zones(model, interfaces, opening, slip), expected)

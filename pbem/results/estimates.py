@@ -14,7 +14,7 @@ from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.between import Violations
-from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions, sum_sizes
+from pbem.results.differences import bound_reactions, measure_energy, subtract_displacements, sum_reactions, sum_sizes
 from pbem.results.rates import (
     EndFinder,
     choose_force_divisor,
@@ -215,8 +215,11 @@ class Comparison:
         moved = subtract_displacements(self._mesh, beside, step, second)
         least = self._bound_factors(step.contact, np.fmax(opening, slip))
         KI, KII = (np.maximum(each, least) for each in factors)
+        reactions = np.abs(np.stack([forces.real, forces.imag], axis=1))
+        if not self._as_they_are:
+            reactions = np.maximum(reactions, bound_reactions(self._model, step))
         return Estimates(
-            np.abs(np.stack([forces.real, forces.imag], axis=1)), opening, slip, traction_n, traction_s, KI, KII,
+            reactions, opening, slip, traction_n, traction_s, KI, KII,
             by * _largest(np.abs(moved[~beside.mesh.node_crack])),
         )
 

@@ -10,7 +10,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import find_parts
 from pbem.model.model import Model
 from pbem.results.contents import Balances
-from pbem.results.growing import append_row
+from pbem.results.growing import GrowingRows
 from pbem.results.opening import freeze, read_names
 from pbem.solve.problem.step import Step
 
@@ -35,11 +35,10 @@ def create_balance(file: h5py.File, model: Model, mesh: Mesh) -> None:
             group[name].attrs["names"] = np.array(names, dtype=h5py.string_dtype())
 
 
-def append_balance(file: h5py.File, step: Step) -> None:
+def append_balance(rows: GrowingRows, step: Step) -> None:
     """Add a step's entries, which are not numbers where it tells nothing of its balance."""
-    group = file.get("balance")
-    for name in group if group else ():
-        append_row(group, name, np.nan if step.balance is None else getattr(step.balance, name))
+    for name in rows.list_names("balance"):
+        rows.append(f"balance/{name}", np.nan if step.balance is None else getattr(step.balance, name))
 
 
 def read_balance(file: h5py.File, steps: int) -> Balances | None:

@@ -6,23 +6,75 @@ from typing import Any
 
 import h5py
 import numpy as np
+from h5py import h5d, h5p, h5s
 from numpy.typing import ArrayLike, NDArray
 
+# Bytes of a dataset's chunks that HDF5 keeps, all of them full but the last one; larger ones it writes at once.
+CACHED = 1 << 16
+# Where it looks for them: a prime number of places.
+PLACES = 31
 
-def append_row(group: h5py.Group, name: str, row: ArrayLike) -> None:
-    """Add one entry along the first axis of a dataset; row: of the shape of an entry, or a number for all of it."""
-    own = h5py.h5d.open(group.id, name.encode())
-    _extend(own, np.broadcast_to(np.asarray(row), own.shape[1:])[None, ...])
+
+class GrowingRows:
+    """Adds entries to the datasets of an open file.
+
+    These are opened at their first entry and stay so for as long as the file is open: to open one takes longer than to
+    write to it, and what its last chunk holds would be read again for the next entry.
+    """
+
+    def __init__(self, file: h5py.File) -> None:
+        self._file = file
+        self._opened: dict[str, _Rows] = {}
+        self._names: dict[str, tuple[str, ...]] = {}
+
+    def append(self, path: str, row: ArrayLike) -> None:
+        """Add one entry along the first axis of a dataset; row: of the shape of an entry, or a number for all of it.
+
+        Raises KeyError if there is no such dataset, ValueError for a row of another shape.
+        """
+        rows = self._opened.get(path)
+        if rows is None:
+            rows = self._opened[path] = _Rows(self._file, path)
+        rows.append(row)
+
+    def list_names(self, group: str) -> tuple[str, ...]:
+        """Names of what a group holds, which stay the same; none if there is no such group."""
+        if group not in self._names:
+            self._names[group] = tuple(self._file[group]) if group in self._file else ()
+        return self._names[group]
+
+
+class _Rows:
+    """An open dataset that grows."""
+
+    def __init__(self, file: h5py.File, path: str) -> None:
+        access = h5p.create(h5p.DATASET_ACCESS)
+        access.set_chunk_cache(PLACES, CACHED, 1.0)
+        self._own = h5d.open(file.id, path.encode(), access)
+        self._count, *rest = self._own.shape
+        self._row, self._kind, self._type = tuple(rest), self._own.dtype, self._own.get_type()
+        self._entry = h5s.create_simple((1, *rest))
+        self._first = (0,) * len(rest)
+        self._empty = 0 in self._row
+
+    def append(self, row: ArrayLike) -> None:
+        values = np.empty((1, *self._row), dtype=self._kind)
+        values[0] = row
+        self._own.set_extent((self._count + 1, *self._row))
+        if not self._empty:
+            place = self._own.get_space()
+            place.select_hyperslab((self._count, *self._first), values.shape)
+            self._own.write(self._entry, place, values, self._type)
+        self._count += 1
 
 
 def extend(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
-    """Add entries (n, ...) along the first axis. Raises ValueError for those of another shape."""
-    _extend(dataset.id, rows)
+    """Add entries (n, ...) along the first axis. Raises ValueError for those of another shape.
 
-
-def _extend(own: h5py.h5d.DatasetID, rows: NDArray[Any]) -> None:
-    """As `dataset.resize` and `dataset[count:] = rows` do, of whose time HDF5 takes a third: the rest goes to what else
-    a dataset offers, and to all that may stand in the brackets."""
+    As `dataset.resize` and `dataset[count:] = rows` do, of whose time HDF5 takes a third: the rest goes to what else a
+    dataset offers, and to all that may stand in the brackets.
+    """
+    own = dataset.id
     count, *others = own.shape
     if rows.shape[1:] != tuple(others):
         raise ValueError(f"found entries of the shape {rows.shape[1:]}; expected {tuple(others)}")
@@ -30,4 +82,4 @@ def _extend(own: h5py.h5d.DatasetID, rows: NDArray[Any]) -> None:
     if rows.size:
         place = own.get_space()
         place.select_hyperslab((count, *(0 for _ in others)), rows.shape)
-        own.write(h5py.h5s.create_simple(rows.shape), place, np.ascontiguousarray(rows))
+        own.write(h5s.create_simple(rows.shape), place, np.ascontiguousarray(rows))

@@ -7,7 +7,7 @@ import numpy as np
 
 from pbem.mesh.mesh import Mesh
 from pbem.results.contents import Linearities
-from pbem.results.growing import append_row
+from pbem.results.growing import GrowingRows
 from pbem.results.opening import freeze, read_names
 from pbem.solve.problem.step import Linearity, Step
 from pbem.solve.steps.linearity import describe_nonlinearity
@@ -27,11 +27,10 @@ def create_linearity(file: h5py.File, mesh: Mesh) -> None:
         group[name].attrs["names"] = np.array(names, dtype=h5py.string_dtype())
 
 
-def append_linearity(file: h5py.File, step: Step) -> None:
+def append_linearity(rows: GrowingRows, step: Step) -> None:
     """Add a step's entries, which are not numbers where it does not tell them."""
-    group = file.get("linearity")
-    for name in group if group else ():
-        append_row(group, name, np.nan if step.linearity is None else getattr(step.linearity, name))
+    for name in rows.list_names("linearity"):
+        rows.append(f"linearity/{name}", np.nan if step.linearity is None else getattr(step.linearity, name))
 
 
 def read_linearity(file: h5py.File, steps: int) -> Linearities | None:

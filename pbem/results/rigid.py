@@ -12,7 +12,7 @@ from pbem.arrays import Complex, Real
 from pbem.mesh.mesh import Faces
 from pbem.model.model import Model
 from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference, unit_motions
-from pbem.results.growing import append_row
+from pbem.results.growing import GrowingRows
 from pbem.results.opening import freeze, read_names
 
 # Unknown moments and rotations of a single point are told apart from nothing below this part.
@@ -79,13 +79,14 @@ def create_rigid(file: h5py.File, model: Model) -> None:
 
 
 def append_rigid(
-    file: h5py.File, model: Model, curve_names: tuple[str, ...], faces: Faces, displacement: Complex, traction: Complex
+    rows: GrowingRows, model: Model, curve_names: tuple[str, ...], faces: Faces, displacement: Complex,
+    traction: Complex,
 ) -> None:
     """Add a step's entries."""
     for name, body in model.rigid.items():
         values = measure_rigid(model, body, curve_names, faces, displacement, traction)
         for kind, row in zip(("force", "motion"), values, strict=True):
-            append_row(file["rigid"][name], kind, row)
+            rows.append(f"rigid/{name}/{kind}", row)
 
 
 def read_rigid(file: h5py.File, steps: int) -> dict[str, RigidMotion]:

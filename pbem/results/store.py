@@ -12,6 +12,7 @@ import h5py
 from pbem.errors import ResultFileError
 from pbem.heap import give_back
 from pbem.results.free_lists import empty_free_lists
+from pbem.results.growing import GrowingRows
 from pbem.results.journal import JournaledFile, lock
 from pbem.results.opening import open_unlocked
 from pbem.results.trial import try_reading
@@ -26,7 +27,10 @@ TAKEN = "is being written by another run; wait for its end, or name another outp
 
 
 class Store:
-    """An open result file. file: the h5py file; its changes are on the disk after `commit`, all of them or none."""
+    """An open result file. file: the h5py file; its changes are on the disk after `commit`, all of them or none.
+
+    rows: adds entries to what grows with the steps.
+    """
 
     def __init__(self, path: Path, fill: Callable[[h5py.File], None] | None = None) -> None:
         """Open an existing file; an empty one with what `fill` writes, which then is on the disk.
@@ -49,19 +53,19 @@ class Store:
                 self._journal.waits = True
             elif not self._journal.checked:
                 try_reading(path)
-            self.file = self._open()
+            self._reopen()
             empty_free_lists()
             give_back()
         except BaseException:
             self._journal.close()
             raise
 
-    def _open(self) -> h5py.File:
+    def _reopen(self) -> None:
         # What HDF5 itself refuses ends badly in h5py when the file is not a path: it is tried as one before.
         open_unlocked(self.path).close()
-        file = h5py.File(self._journal, "r+", libver=VERSIONS)
-        _limit_cache(file)
-        return file
+        self.file = h5py.File(self._journal, "r+", libver=VERSIONS)
+        _limit_cache(self.file)
+        self.rows = GrowingRows(self.file)
 
     @property
     def dirty(self) -> bool:
@@ -79,7 +83,7 @@ class Store:
         with suppress(Exception):
             self.file.close()
         self._journal.abandon()
-        self.file = self._open()
+        self._reopen()
 
     def close(self) -> None:
         """Commit and close the file."""

@@ -24,7 +24,7 @@ from pbem.results.balance import append_balance
 from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.former import read_former, write_former
-from pbem.results.growing import append_row, extend
+from pbem.results.growing import extend
 from pbem.results.layout import (
     ENERGIES,
     ITERATION,
@@ -158,6 +158,7 @@ class ResultWriter:
         self._pending: Step | None = None
         self.appended = 0  # steps that are in the file for good
         self.notes: Iterable[str] = ()  # read whenever something is brought to the disk
+        self._noted: set[str] = set()  # those that the open file has
 
     @property
     def _file(self) -> h5py.File:
@@ -200,10 +201,21 @@ class ResultWriter:
 
     def _commit(self, what: str) -> None:
         try:
-            append_notes(self._file, self.notes)
+            self._append_notes()
             self._storage.commit()
         except OSError as error:
             raise StorageError(str(self.path), f"no room for {what} ({error.strerror or error})") from error
+
+    def _append_notes(self) -> bool:
+        """Keep the notes that are new; whether there were any."""
+        new = [each for each in self.notes if each not in self._noted]
+        self._noted.update(new)
+        return bool(new) and append_notes(self._file, new)
+
+    def _roll_back(self) -> None:
+        """Forget what was written since the last commit."""
+        self._storage.roll_back()
+        self._noted.clear()
 
     def complete(self, interior: InteriorValues) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""
@@ -212,7 +224,7 @@ class ResultWriter:
 
     def _store(self, step: Step) -> None:
         self._pending = None
-        file = self._file
+        file, rows = self._file, self._storage.rows
         write_former(file, self._before, step, self._pairs)
         hoop_stress, reactions = self._evaluate_hoop_stress(step), self._sum_reactions(step.traction)
         tips = self.tip_rules.evaluate_all(step) if self.tip_rules.cracks else {}
@@ -221,44 +233,38 @@ class ResultWriter:
             hoop_stress = np.where(gone, np.nan, hoop_stress)
             tips = self._absence.blank_tips(step.stage, self.tip_rules.cracks, tips)
             step = self._absence.blank(step)
-        fields = file["fields"]
-        append_row(fields, "hoop_stress", hoop_stress)
-        if "interior" in file:
+        rows.append("fields/hoop_stress", hoop_stress)
+        if rows.list_names("interior"):
             count = len(self._model.interior_points)
             none = InteriorValues(np.full(count, complex(np.nan, np.nan)), np.full((count, 3), np.nan))
             interior = step.interior or none
-            append_row(file["interior"], "displacement", to_columns(interior.displacement))
-            append_row(file["interior"], "stress", interior.stress)
-        append_row(fields, "displacement", to_columns(step.displacement))
-        append_row(fields, "traction", to_columns(step.traction))
-        together = file["all"]
+            rows.append("interior/displacement", to_columns(interior.displacement))
+            rows.append("interior/stress", interior.stress)
+        rows.append("fields/displacement", to_columns(step.displacement))
+        rows.append("fields/traction", to_columns(step.traction))
         if self._model.conditions or self._model.point_supports:
             unknown = np.full(2, np.nan)
             supports = [step.support_reactions.get(name, unknown) for name in self._model.point_supports]
-            rows = [to_columns(reactions), np.array(supports).reshape(-1, 2)]
-            append_row(together, "reactions", np.concatenate(rows))
+            of_both = [to_columns(reactions), np.array(supports).reshape(-1, 2)]
+            rows.append("all/reactions", np.concatenate(of_both))
         contact = {name: getattr(step.contact, name) for name in SHOWN} | dict(step.contact.internal)
-        of_pairs = together["contact"] if len(self._pairs) else None
-        for quantity in list_pair_datasets(self._model) if of_pairs else ():
-            append_row(of_pairs, quantity, contact[quantity][self._pairs])
+        for quantity in list_pair_datasets(self._model) if len(self._pairs) else ():
+            rows.append(f"all/contact/{quantity}", contact[quantity][self._pairs])
         for kind, at_tips in tips.items():
-            append_row(together["tips"], kind, at_tips)
-        estimates = file["estimates"]
-        for name in estimates:
-            append_row(estimates, name, self._estimates.get(name, np.nan))
-        energies = file["energy"]
+            rows.append(f"all/tips/{kind}", at_tips)
+        for name in rows.list_names("estimates"):
+            rows.append(f"estimates/{name}", self._estimates.get(name, np.nan))
         for kind in ENERGIES:
-            append_row(energies, kind, getattr(self._energy, kind))
-        append_balance(file, step)
-        append_linearity(file, step)
+            rows.append(f"energy/{kind}", getattr(self._energy, kind))
+        append_balance(rows, step)
+        append_linearity(rows, step)
         if self._model.rigid:
             faces = list_faces(self._mesh)
-            append_rigid(file, self._model, self._mesh.curve_names, faces, step.displacement, step.traction)
+            append_rigid(rows, self._model, self._mesh.curve_names, faces, step.displacement, step.traction)
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
-        steps = file["steps"]
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
-            append_row(steps, quantity, value)
+            rows.append(f"steps/{quantity}", value)
 
     def note_missing(self, reason: str) -> None:
         """Say in the file why errors are not estimated."""
@@ -335,11 +341,11 @@ class ResultWriter:
             last = self._pending is not None
             if self._pending is not None:
                 self._store(self._pending)
-            if append_notes(self._file, self.notes) or last:
+            if self._append_notes() or last:
                 self._storage.commit()
         except OSError as error:
             self._pending = None
-            self._storage.roll_back()
+            self._roll_back()
             if status == "finished":
                 self.fail("StorageError", str(error), "stopped")
                 raise StorageError(str(self.path), f"no room for the last step ({error.strerror or error})") from error
@@ -368,7 +374,7 @@ class ResultWriter:
         # What ended the run must be what the user hears of, not that its last words could not be written.
         with suppress(Exception):
             if self._storage.is_open and self._storage.dirty:
-                self._storage.roll_back()  # it ended within a step
+                self._roll_back()  # it ended within a step
             if self._storage.is_open and isinstance(error, StopError) and error.unfinished is not None and not later:
                 write_unfinished(self._file, error.unfinished, self._pairs)
             self._close(reasons["status"], reasons)

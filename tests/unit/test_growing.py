@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from pbem.results.growing import append_row, extend
+from pbem.results.growing import GrowingRows, extend
 
 COLUMNS = np.dtype([("number", "i4"), ("residual", "f8")])
 
@@ -27,8 +27,9 @@ def test_entries_are_those_of_h5py(tmp_path: Path, shape: tuple[int, ...], kind:
     with h5py.File(tmp_path / "grown.h5", "w") as file:
         mine, other = (file.create_dataset(name, (0, *shape), kind, maxshape=(None,) * (1 + len(shape)), chunks=(4, *(
             max(1, each) for each in shape))) for name in ("mine", "other"))
+        growing = GrowingRows(file)
         for row in rows:
-            append_row(file, "mine", row)
+            growing.append("mine", row)
             other.resize(len(other) + 1, axis=0)
             other[-1] = row
         assert mine.shape == (len(rows), *shape) and mine[()].tobytes() == other[()].tobytes()
@@ -44,5 +45,28 @@ def test_entries_of_another_shape_are_refused_and_leave_the_dataset_alone(tmp_pa
         with pytest.raises(ValueError, match="found entries of the shape"):
             extend(dataset, np.zeros((2, 4)))
         with pytest.raises(ValueError, match="broadcast"):
-            append_row(file, "mine", np.zeros(4))
+            GrowingRows(file).append("mine", np.zeros(4))
         assert dataset.shape == (0, 3)
+
+
+def test_entries_reach_the_file_though_its_datasets_stay_open(tmp_path: Path) -> None:
+    """After a flush whoever opens it finds them; a file that is opened once more has rows of its own."""
+    path = tmp_path / "grown.h5"
+    with h5py.File(path, "w") as file:
+        group = file.create_group("fields")
+        group.create_dataset("many", (0, 5000), "f8", maxshape=(None, 5000), chunks=(2, 5000))
+        group.create_dataset("few", (0,), "i4", maxshape=(None,), chunks=(64,))
+    for begin in (0, 70):
+        with h5py.File(path, "r+") as file:
+            rows = GrowingRows(file)
+            assert rows.list_names("fields") == ("few", "many") and rows.list_names("others") == ()
+            for number in range(begin, begin + 70):
+                rows.append("fields/few", number)
+                rows.append("fields/many", np.full(5000, float(number)))
+            file.flush()
+            assert file["fields/few"][-1] == begin + 69
+            with pytest.raises(KeyError):
+                rows.append("fields/none", 1.0)
+    with h5py.File(path) as file:
+        assert (file["fields/few"][...] == np.arange(140)).all()
+        assert (file["fields/many"][...] == np.arange(140)[:, None]).all()

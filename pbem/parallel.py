@@ -172,6 +172,8 @@ def do_on_first(comm: MPI.Intracomm, expected: type[Exception], action: Callable
 
     share=False keeps the value on the first rank (it cannot be sent); the others get None.
     """
+    if comm.size == 1:  # what is sent is packed, though to oneself
+        return action()
     value, error = None, None
     if comm.rank == 0:
         try:
@@ -256,6 +258,8 @@ def share_nodes(costs: Real, ranks: int) -> Integer:
 
 def gather_parts(comm: MPI.Intracomm, part: Real) -> Real:
     """All ranks' parts (k,) one after the other, on every rank."""
+    if comm.size == 1:
+        return np.array(part, dtype=float)
     counts = np.array(comm.allgather(len(part)))
     whole = np.empty(int(counts.sum()))
     comm.Allgatherv(np.ascontiguousarray(part), [whole, counts])
@@ -288,4 +292,4 @@ def largest_of_parts(comm: MPI.Intracomm, part: Real) -> float:
 
 def broadcast(comm: MPI.Intracomm, value: Any) -> Any:
     """The first rank's value, on every rank."""
-    return comm.bcast(value, root=0)
+    return value if comm.size == 1 else comm.bcast(value, root=0)

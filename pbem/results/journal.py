@@ -191,25 +191,31 @@ class JournaledFile:
     def write(self, data: memoryview) -> int:
         """As of any file, into memory."""
         view = memoryview(data).cast("B")
-        done = 0
-        while done < len(view):
+        done, size = 0, len(view)
+        while done < size:
             number, offset = divmod(self._at, PAGE)
-            part = view[done : done + PAGE - offset]
-            self._open_page(number)[offset : offset + len(part)] = part
-            done, self._at = done + len(part), self._at + len(part)
+            length = min(size - done, PAGE - offset)
+            part = view[done : done + length]
+            if length == PAGE:  # of what was there nothing is left
+                self._pages[number] = bytearray(part)
+            else:
+                self._open_page(number)[offset : offset + length] = part
+            done, self._at = done + length, self._at + length
         self._length = max(self._length, self._at)
         if len(self._pages) > MOST_WAITING and not self.waits:
             try:
                 self.commit()
             except OSError:  # where there is no room all that follows waits, and the last commit says so
                 self.waits = True
-        return len(view)
+        return size
 
     def _open_page(self, number: int) -> bytearray:
-        if number not in self._pages:
-            there = max(0, min(PAGE, self._committed - number * PAGE))
-            self._pages[number] = bytearray(read_fully(self._disk, there, number * PAGE)).ljust(PAGE, b"\0")
-        return self._pages[number]
+        page = self._pages.get(number)
+        if page is None:
+            there = min(PAGE, self._committed - number * PAGE)
+            found = read_fully(self._disk, there, number * PAGE) if there > 0 else b""
+            page = self._pages[number] = bytearray(found).ljust(PAGE, b"\0")
+        return page
 
     def truncate(self, size: int | None = None) -> int:
         """As of any file."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.contact.custom import find_fault
 from pbem.errors import ConvergenceError, LawError, ResultFileError, StopError, StorageError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
@@ -25,6 +24,7 @@ from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.former import read_former, write_former
 from pbem.results.growing import extend
+from pbem.results.hoop_stress import HoopStress
 from pbem.results.layout import (
     ENERGIES,
     ITERATION,
@@ -49,7 +49,6 @@ from pbem.results.runaway import describe_runaway
 from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
 from pbem.results.unfinished import drop_unfinished, read_unfinished, write_unfinished
-from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import Former, InteriorValues, Iteration, Step, Unfinished
 
 # What ends a run though nothing is wrong with it.
@@ -154,6 +153,7 @@ class ResultWriter:
         self.tip_rules = collect_tip_rules(model, mesh)
         self._balance = EnergyBalance(model, mesh, last_step, reached)
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
+        self._hoop_stress = HoopStress(model, mesh)
         self._absence = Absence(model, mesh, points)
         self._pending: Step | None = None
         self.appended = 0  # steps that are in the file for good
@@ -226,7 +226,7 @@ class ResultWriter:
         self._pending = None
         file, rows = self._file, self._storage.rows
         write_former(file, self._before, step, self._pairs)
-        hoop_stress, reactions = self._evaluate_hoop_stress(step), self._sum_reactions(step.traction)
+        hoop_stress, reactions = self._hoop_stress.evaluate(step), self._sum_reactions(step.traction)
         tips = self.tip_rules.evaluate_all(step) if self.tip_rules.cracks else {}
         gone = self._absence.list_faces(step.stage)
         if gone is not None:
@@ -295,22 +295,6 @@ class ResultWriter:
             self._commit("the last step")
         group = self._file["estimates"]
         return {name.removeprefix("relative_"): group[name][...] for name in group if name.startswith("relative_")}
-
-    def _evaluate_hoop_stress(self, step: Step) -> Real:
-        """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""
-        initial = [balanced for balanced, _ in evaluate_particular_solutions(self._model, step.stage, step.factor)]
-        kinds: dict[Hashable, int] = {}
-        kind_of = [kinds.setdefault((each.material, each.initial, each.swelling, each.points), len(kinds))
-                   for each in initial]
-        mesh = self._mesh
-        if mesh.order > 0:  # else the stretch is told by neighbours of the same region
-            mesh = replace(mesh, region=np.array(kind_of)[mesh.region])
-            initial = [initial[kind_of.index(number)] for number in range(len(kinds))]
-        stress = evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
-        rigid = np.array([region.rigid for region in self._model.regions])
-        if rigid.any():
-            stress[rigid[list_faces(self._mesh).region]] = 0.0
-        return stress
 
     def _sum_reactions(self, traction: Complex) -> Complex:
         """Integral (c,) of the traction over every outer curve."""

@@ -15,7 +15,7 @@ from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import list_faces
 from pbem.parallel import world
-from pbem.solve.steps import step_notes
+from pbem.solve.steps import closed_gaps, step_notes
 from pbem.solve.steps.closed_gaps import find_closed_gap
 from pbem.solve.steps.passing import Passing
 from tests.verification.test_open_faces import DEPTH, SilentReporter
@@ -101,6 +101,28 @@ boundary.outline = { ux = 0.0, uy = 0.0 }
     found = find_closed_gap(model, mesh, np.where(np.abs(place.imag) < 1e-4, -4e-4j * np.sign(place.imag), 0j))
     assert found is not None
     np.testing.assert_allclose(found.depth, 7e-4, rtol=1e-6)
+
+
+@pytest.mark.parametrize("width", [0.002, 0.02, 0.3, 1.0])
+def test_gaps_that_displacements_cannot_reach_are_not_searched_and_others_are(
+    width: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of sides moved towards each other by any part of the width the depth is what the search alone finds."""
+    model = parse_model(write_slot(width, -1.0))[1]
+    mesh = generate_mesh(model)
+    place = list_faces(mesh).position
+    sides = (np.abs(np.abs(place.imag) - width / 2) < 1e-9) & (np.abs(place.real) < 1)
+    depths, searched = [], []
+    look = closed_gaps._look_across
+    monkeypatch.setattr(closed_gaps, "_look_across", lambda *given: searched.append(given) or look(*given))
+    for shortcut in (True, False):
+        if not shortcut:
+            monkeypatch.setattr(closed_gaps, "_keep_least_distance", lambda *_: 0.0)
+        for part in (1e-6, 0.01, 0.1, 0.3, 0.49, 0.6, 2.0):
+            found = find_closed_gap(model, mesh, np.where(sides, -1j * part * width * np.sign(place.imag), 0j))
+            depths.append(0.0 if found is None else found.depth)
+    assert depths[:7] == depths[7:] and max(depths[:5]) == 0.0 < min(depths[5:])
+    assert 7 < len(searched) < 14  # of the smallest displacements nothing is looked for
 
 
 def test_a_seam_that_is_mined_closes_as_a_slot_does(tmp_path: Path) -> None:

@@ -218,8 +218,10 @@ def _add_up(
 def _measure_parts(problem: Problem, whole: Complex, known: Complex, least: float) -> tuple[_Sums, Real]:
     """The sums of the parts that cracks cut off, with the tractions of the cracks' faces, and what is left over."""
     mesh, parts, chosen = problem.mesh, problem.parts, problem.cut_parts
-    crack = np.flatnonzero(mesh.node_crack)
-    nodes = np.concatenate([np.arange(mesh.nodes), crack]) if len(chosen) else crack[:0]
+    if not len(chosen):
+        none = np.zeros(0)
+        return _Sums(none.astype(complex), none.astype(complex), none, none, none), none
+    nodes = np.concatenate([np.arange(mesh.nodes), np.flatnonzero(mesh.node_crack)])
     sign = np.where(np.arange(len(nodes)) < mesh.nodes, 1.0, -1.0)
     number = np.full(len(parts.region), -1)
     number[chosen] = np.arange(len(chosen))

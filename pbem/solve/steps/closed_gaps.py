@@ -17,8 +17,13 @@ FACING = 0.7
 # What closes a gap is known but for this part of itself, as the node across is not quite opposite, and for this part of
 # the most by which two sides come nearer to each other or part.
 ASIDE, MESH = 0.05, 1e-3
+# Nodes across are looked for as far as this, in the largest gap that displacements can close.
+FARTHEST = 3.0
 # Gaps are looked for around these parts of the largest one that displacements can close.
 AROUND = (0.0, *(0.5**k for k in range(10, -1, -1)))
+# Displacements that are small beside the elements close no gap of the mesh: that is known of it once, from nodes as far
+# apart as the longest element, unless there are more pairs of these than so many a node.
+MOST_NEAR = 64
 
 
 def find_closed_gap(model: Model, mesh: Mesh, displacement: Complex) -> Passing | None:
@@ -33,8 +38,10 @@ def find_closed_gap(model: Model, mesh: Mesh, displacement: Complex) -> Passing 
     own = np.flatnonzero(_find_free(model, mesh))
     if len(own) < 2:
         return None
-    stretch, direction = (each[: mesh.nodes] for each in evaluate_stretch(mesh, displacement))
     reach = 2 * float(np.abs(displacement[own] - displacement[own].mean()).max())
+    if FARTHEST * reach < _keep_least_distance(mesh, own):
+        return None
+    stretch, direction = (each[: mesh.nodes] for each in evaluate_stretch(mesh, displacement))
     across, gap = _look_across(mesh, own, reach)
     normal = mesh.normal[own]
     along = ((mesh.position[own] + gap * normal - mesh.position[across]) * np.conj(direction[across])).real
@@ -54,12 +61,47 @@ def find_closed_gap(model: Model, mesh: Mesh, displacement: Complex) -> Passing 
 
 
 def _find_free(model: Model, mesh: Mesh) -> Bool:
-    """Nodes (n,) on curves that bound one region alone, of those that are there, if it is no tool."""
+    """Nodes (n,) on curves that bound one region alone, of those that are there, if it is no tool; found once for the
+    same regions of a mesh."""
+    known: dict[tuple[tuple[bool, bool], ...], Bool] = mesh.keep("free nodes", lambda _: {})
+    key = tuple((region.removed, region.rigid) for region in model.regions)
+    if key not in known:
+        known.clear()  # those of a stage before
+        known[key] = _look_for_free(model, mesh)
+    return known[key]
+
+
+def _look_for_free(model: Model, mesh: Mesh) -> Bool:
     there = np.array([not region.removed for region in model.regions])[mesh.region] & ~mesh.crack
     owners = np.unique(np.column_stack([mesh.curve, mesh.region])[there], axis=0)
     count = np.bincount(owners[:, 0], minlength=len(mesh.curve_names))
     rigid = np.array([region.rigid for region in model.regions])[mesh.region]
     return np.asarray((there & ~rigid & (count[mesh.curve] == 1))[mesh.node_element])
+
+
+def _keep_least_distance(mesh: Mesh, own: Integer) -> float:
+    """See _find_least_distance; found once for the same free nodes of a mesh."""
+    known: dict[bytes, float] = mesh.keep("distances across", lambda _: {})
+    key = own.tobytes()
+    if key not in known:
+        known.clear()  # those of a stage before
+        known[key] = _find_least_distance(mesh, own)
+    return known[key]
+
+
+def _find_least_distance(mesh: Mesh, own: Integer) -> float:
+    """The distance from a free node (of k) to the nearest one whose normal is about the opposite one and that is ahead
+    of it, or less; at most the length of the longest element; 0 where too many nodes are near each other."""
+    position, normal = mesh.position[own], mesh.normal[own]
+    tree = cKDTree(np.column_stack([position.real, position.imag]))
+    most = float(mesh.geometry.lengths[mesh.node_element[own]].max())
+    if tree.count_neighbors(tree, most) > MOST_NEAR * len(own):
+        return 0.0
+    pairs = tree.query_pairs(most, output_type="ndarray")
+    one, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+    toward, facing = position[other] - position[one], (normal[one] * np.conj(normal[other])).real
+    found = (facing < -FACING) & ((toward * np.conj(normal[other])).real < 0)
+    return float(np.abs(toward[found]).min(initial=most))
 
 
 def _look_across(mesh: Mesh, own: Integer, reach: float) -> tuple[Integer, Real]:

@@ -85,9 +85,7 @@ def describe_passing(found: Passing) -> str:
 def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex) -> list[tuple[int, int]]:
     """Bodies by number, and others that they are not joined to, where their boxes meet once they have moved."""
     numbers = {name: number for number, name in enumerate(mesh.region_names)}
-    owners: dict[int, set[int]] = {}
-    for curve, region in np.unique(np.column_stack([mesh.curve, mesh.region]), axis=0).tolist():
-        owners.setdefault(curve, set()).add(region)
+    owners = mesh.keep("regions of curves", _list_owners)
     joined = {frozenset(own) for own in owners.values() if len(own) == 2}
     curves = {name: owners.get(number, set()) for number, name in enumerate(mesh.curve_names)}
     joined |= {
@@ -107,6 +105,14 @@ def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex)
     at, found = boxes.find_meeting(boxes)
     pairs = {(finite[i], finite[j]) for i, j in zip(at.tolist(), found.tolist(), strict=True) if i != j}
     return sorted(pair for pair in pairs.union(around) if frozenset(pair) not in joined)
+
+
+def _list_owners(mesh: Mesh) -> dict[int, set[int]]:
+    """The regions by the numbers of the curves that bound them, or are cracks in them."""
+    owners: dict[int, set[int]] = {}
+    for curve, region in np.unique(np.column_stack([mesh.curve, mesh.region]), axis=0).tolist():
+        owners.setdefault(curve, set()).add(region)
+    return owners
 
 
 def _measure_sagitta(mesh: Mesh, region: int) -> float:

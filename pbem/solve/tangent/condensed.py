@@ -66,7 +66,8 @@ class Known:
     """What is known of the reference operator that is factorised.
 
     laws (m, 4, 2): the tangents of all pairs in it. bases: of the varying pairs. columns: of those that have changed.
-    effort: what has been done since it was factorised. loads: solutions for all loads so far; load: for the last.
+    effort: what has been done since it was factorised; counted (v, 4, 2): the tangents of the varying pairs whose
+    system was counted last. loads: solutions for all loads so far; load: for the last.
     """
 
     laws: Real
@@ -75,6 +76,7 @@ class Known:
     effort: Effort
     loads: LoadBasis
     load: LoadSolution | None = None
+    counted: Real | None = None
 
 
 class CondensedTangent(TangentOperator):
@@ -141,9 +143,13 @@ class CondensedTangent(TangentOperator):
             return False
         changed = np.flatnonzero((self._split(law).b_tangent != 0).any(axis=(1, 2)))
         missing = np.setdiff1d(changed, known.columns.known)
-        if not known.effort.allows(2 * len(missing), 2 * len(changed)) and self._can_be_nearer(law):
+        # From one step to the next most often no tangent changes: the factors of their system serve again.
+        tangents = law.tangent[self.varying]
+        size = 0 if known.counted is not None and np.array_equal(known.counted, tangents) else 2 * len(changed)
+        if not known.effort.allows(2 * len(missing), size) and self._can_be_nearer(law):
             return False
-        self._add_columns(missing, 2 * len(changed))
+        self._add_columns(missing, size)
+        self.known = replace(self._present, counted=tangents)
         return True
 
     def _add_columns(self, missing: Integer, size: int) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from pbem.results.reader import Results, open_results
+from tests.parallel.launch import TIMEOUT
 
 Launch = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -22,6 +24,43 @@ from pbem.results.estimator import Estimator
 pbem.driver.make_estimator = lambda model, mesh, *_: Estimator(model, mesh, None, None, "", world.rank == 0)
 sys.exit(main(sys.argv[1:]))
 """
+
+# Commands of the program one after the other, on the same ranks; what each rank writes is kept apart.
+ONE_BY_ONE = """
+import contextlib, io, json, os, sys
+from pathlib import Path
+from pbem.cli import main
+from pbem.parallel import world
+
+ended = {}
+for name, (folder, arguments) in json.loads(Path(sys.argv[1]).read_text()).items():
+    os.chdir(folder)
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(arguments)
+    ended[name] = world.gather((code, out.getvalue(), err.getvalue()))
+if world.rank == 0:
+    Path(sys.argv[2]).write_text(json.dumps(ended))
+"""
+
+
+def run_one_by_one(
+    snippet: Launch, ranks: int, commands: Mapping[str, tuple[Path, Sequence[str]]], folder: Path,
+    timeout: float = TIMEOUT,
+) -> dict[str, subprocess.CompletedProcess[str]]:
+    """What becomes of commands `pbem arguments...` in folders of their own, by one launch: to start takes longer than
+    a small case. All ranks have to return the same code; outputs are those of all ranks, one after the other."""
+    listed, told = folder / "commands.json", folder / "ended.json"
+    given = {name: (str(where), list(arguments)) for name, (where, arguments) in commands.items()}
+    listed.write_text(json.dumps(given))
+    done = snippet(ranks, ONE_BY_ONE, listed, told, timeout=timeout)
+    assert done.returncode == 0, done.stdout + done.stderr
+    ended = {}
+    for name, by_rank in json.loads(told.read_text()).items():
+        (code,) = {code for code, _, _ in by_rank}
+        out, err = ("".join(each[k] for each in by_rank) for k in (1, 2))
+        ended[name] = subprocess.CompletedProcess(list(commands[name][1]), code, out, err)
+    return ended
 
 
 def run_hierarchical(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
@@ -15,9 +15,10 @@ import pbem
 from pbem.cli import main
 from pbem.results.reader import open_results
 from tests.cli.cli_sample import BLOCKS
-from tests.parallel.launch import launch
+from tests.parallel.launch import launch, launch_snippet
+from tests.parallel.on_ranks import run_one_by_one
 
-Launch = Callable[..., subprocess.CompletedProcess[str]]
+Done = subprocess.CompletedProcess[str]
 
 CUSTOM = 'law = "custom"\nfile = "law.py"\nparameters = { friction = 0.2 }'
 CASE = BLOCKS.replace('law = "coulomb"\nfriction = 0.2', CUSTOM)
@@ -62,11 +63,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize(("what", "ranks"), [("ends the process", 1), *((what, 2) for what in WRONG)])
-def test_a_law_that_goes_wrong_ends_all_ranks(what: str, ranks: int, folder: Path) -> None:
-    change, said = WRONG[what]
-    (folder / "law.py").write_text(LAW.replace("CHANGE", change))
-    done = launch(ranks, "run", "case.toml", "--quiet", cwd=folder)
+def expect_wrong(done: subprocess.CompletedProcess[str], said: str, folder: Path) -> None:
     assert done.returncode == 1, done.stderr
     assert done.stderr.count(said) == 1 and "Traceback" not in done.stderr, done.stderr
     results = open_results(folder / "case.h5")
@@ -74,9 +71,43 @@ def test_a_law_that_goes_wrong_ends_all_ranks(what: str, ranks: int, folder: Pat
     assert np.isfinite(results.traction).all()
 
 
-def test_a_file_that_fails_on_one_rank_ends_all(folder: Path) -> None:
-    (folder / "law.py").write_text(LAW.replace("CHANGE", "pass").replace("\ndef ", "\nassert rank == 0\ndef "))
-    done = launch(2, "run", "case.toml", "--quiet", cwd=folder)
+def test_a_law_that_ends_the_process_ends_the_run(folder: Path) -> None:
+    change, said = WRONG["ends the process"]
+    (folder / "law.py").write_text(LAW.replace("CHANGE", change))
+    expect_wrong(launch(1, "run", "case.toml", "--quiet", cwd=folder), said, folder)
+
+
+# Laws by what they are, and the options of their runs.
+ON_TWO_RANKS = {
+    **{what: (LAW.replace("CHANGE", change), ()) for what, (change, _) in WRONG.items()},
+    "file": (LAW.replace("CHANGE", "pass").replace("\ndef ", "\nassert rank == 0\ndef "), ()),
+    "right": (LAW.replace("CHANGE", "pass"), ("--set", "solver.operator=hierarchical")),
+    "no function": (LAW.replace("CHANGE", "friction = friction * (1 + 0.1 * calls)"), ()),
+}
+
+
+@pytest.fixture(scope="module")
+def on_two_ranks(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, tuple[Path, Done]]:
+    """Where laws have been run with on two ranks, and what has become of that; one launch for all, after each of which
+    the ranks have to be fit for the next."""
+    folder, commands = tmp_path_factory.mktemp("laws"), {}
+    for number, (what, (law, options)) in enumerate(ON_TWO_RANKS.items()):
+        (where := folder / str(number)).mkdir()
+        (where / "case.toml").write_text(CASE)
+        (where / "law.py").write_text(law)
+        commands[what] = (where, ["run", "case.toml", "--quiet", *options])
+    ended = run_one_by_one(launch_snippet, 2, commands, folder)
+    return {what: (commands[what][0], done) for what, done in ended.items()}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_law_that_goes_wrong_ends_all_ranks(what: str, on_two_ranks: Mapping[str, tuple[Path, Done]]) -> None:
+    where, done = on_two_ranks[what]
+    expect_wrong(done, WRONG[what][1], where)
+
+
+def test_a_file_that_fails_on_one_rank_ends_all(on_two_ranks: Mapping[str, tuple[Path, Done]]) -> None:
+    _, done = on_two_ranks["file"]
     assert done.returncode == 1, done.stderr
     said = "law.py fails (AssertionError: )"
     assert done.stderr.count(said) == 1 and "Traceback" not in done.stderr, done.stderr
@@ -96,10 +127,12 @@ def test_the_text_of_a_law_is_stored_and_compared(folder: Path) -> None:
     np.testing.assert_allclose(whole.traction, pbem.run(coulomb, folder / "coulomb.h5").traction, rtol=0, atol=1e-9)
 
 
-def test_a_law_that_is_right_runs_on_two_ranks_with_the_hierarchical_operator(folder: Path) -> None:
-    done = launch(2, "run", "case.toml", "--quiet", "--set", "solver.operator=hierarchical", cwd=folder)
+def test_a_law_that_is_right_runs_on_two_ranks_with_the_hierarchical_operator(
+    on_two_ranks: Mapping[str, tuple[Path, Done]]
+) -> None:
+    where, done = on_two_ranks["right"]
     assert done.returncode == 0, done.stderr
-    assert open_results(folder / "case.h5").status == "finished"
+    assert open_results(where / "case.h5").status == "finished"
 
 
 def read_broken(path: Path) -> NDArray[np.bool_]:
@@ -126,21 +159,21 @@ def test_bonds_of_a_custom_law_fail_alike_on_two_ranks(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("change", "said", "ranks"), [
-    ("friction = friction * (1 + 0.1 * calls)", "bound = 0.00022, then 0.00024", 2),
+    ("", "bound = 0.00022, then 0.00024", 2),
     ("friction = friction * (1 + 0.1 * calls * (slip > 1e-3))", "bound = 0.00022, then 0.00024", 1),
     ("friction = friction * (1 + 0.1 * calls * (p_n < -10))", "bound = 220, then 240", 1),
 ])  # fmt: skip
 def test_a_law_that_is_no_function_of_its_arguments_is_a_fault(
     change: str, said: str, ranks: int, folder: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], on_two_ranks: Mapping[str, tuple[Path, Done]],
 ) -> None:  # fmt: skip
     """Its search ended as "mode cycle", with the advice to take shorter elements."""
-    (folder / "law.py").write_text(LAW.replace("CHANGE", change))
     if ranks == 1:
+        (folder / "law.py").write_text(LAW.replace("CHANGE", change))
         monkeypatch.chdir(folder)
         code, told = main(["run", "case.toml", "--quiet"]), capsys.readouterr().err
     else:
-        done = launch(ranks, "run", "case.toml", "--quiet", cwd=folder)
+        folder, done = on_two_ranks["no function"]
         code, told = done.returncode, done.stderr
     assert code == 2, told
     assert told.count(f"the law law.py answers differently when it is asked again: {said}") == 1, told

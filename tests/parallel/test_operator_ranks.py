@@ -38,10 +38,15 @@ RUN_ALL = """
 import sys
 from pathlib import Path
 import pbem
+import pbem.driver
 from pbem.bem import hierarchical
+from pbem.parallel import world
+from pbem.results.estimator import Estimator
 from pbem.solve.preconditioner import subdomains as groups
 hierarchical.LEAF_ELEMENTS = hierarchical.SMALL_REGION = 4
 groups.ONE_GROUP, groups.GROUP_ELEMENTS = 0, 12
+# Second solutions on several ranks are those of test_ranks.
+pbem.driver.make_estimator = lambda model, mesh, *_: Estimator(model, mesh, None, None, "", world.rank == 0)
 for case in sys.argv[2:]:
     pbem.run(case, Path(sys.argv[1]) / (Path(case).stem + ".h5"), operator="hierarchical", petsc={"ksp_rtol": "1e-13"})
 """

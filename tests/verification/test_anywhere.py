@@ -25,6 +25,8 @@ from pbem.solve.steps.linearity import measure_linearity
 from scripts import study_stacks
 from scripts.study_places import MOVES, study
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Solve = Callable[[str], Results]
 
 

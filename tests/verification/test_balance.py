@@ -21,6 +21,8 @@ from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 
 def write_bar(length: float, inside: str, unit: float = 1.0) -> str:
     """A bar that is clamped at its right end; inside: "crack" or "inclusion", under pressure, or "swollen"."""

@@ -57,6 +57,7 @@ def test_a_crack_in_the_side_of_a_strip(order: int, part: float, turn: float, un
     assert abs(found / tada(part) - 1) < 3 * results.errors.relative["factors"][-1] + 3e-3  # the formula's own
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_crack_close_to_the_side_of_a_strip(order: int, tmp_path: Path) -> None:
     one, other = (pbem.run(make_strip(scheme, order, (0.4, 0.95), False), tmp_path / f"{scheme}.h5")

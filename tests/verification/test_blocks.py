@@ -19,6 +19,8 @@ from pbem.mesh.numbering import split_components
 from pbem.mesh.parts import find_parts
 from pbem.solve.system.assembly import assemble_problem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Ring = list[complex]
 SQUARE: Ring = [-0.6 - 0.5j, 0.7 - 0.4j, 0.6 + 0.6j, -0.5 + 0.7j]
 WITHIN: Ring = [-0.2 - 0.2j, 0.25 - 0.15j, 0.2 + 0.25j, -0.15 + 0.2j]

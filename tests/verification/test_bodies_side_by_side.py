@@ -11,6 +11,8 @@ import pbem
 from pbem.errors import ConvergenceError
 from tests.verification.test_settling import Listener
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 CURVES = {
     "base": [(0, 0), (2, 0)], "sl": [(0, 0), (0, 1)], "sr": [(2, 0), (2, 1)], "bl": [(0, 1), (1, 1)],
     "br": [(1, 1), (2, 1)], "ll": [(0, 1), (0, 2.2)], "mid": [(1, 1), (1, 2.2)], "rr": [(2, 1), (2, 2.2)],

@@ -56,6 +56,7 @@ def lacks(results: pbem.Results) -> np.ndarray:
     return np.asarray(np.abs(left) / np.abs(energy.external).max())
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(
     ("scheme", "operator", "unit", "at"),
     [("SST", "dense", 1.0, (0.0, 0.0)), ("DBEM", "hierarchical", 1e3, (1e6, -2e6)), ("HST", "dense", 1e-3, (0.0, 1.0)),
@@ -96,6 +97,7 @@ def test_an_excavated_tunnel_is_that_of_kirsch(
     assert results.energy.removed[-1] == pytest.approx(results.energy.elastic[-1] / 2, rel=1e-3)
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(
     ("scheme", "operator", "axes", "swap"),
     [("SST", "dense", "xy", False), ("DBEM", "hierarchical", "ns", True), ("HST", "dense", "xy", True),
@@ -128,6 +130,7 @@ def test_tractions_on_the_wall_replace_what_the_core_carried(
     assert lacks(results).max() < 1e-9
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_a_joint_beside_the_tunnel(tmp_path: Path) -> None:
     """It slips as it does where the tunnel is there from the start and the stress comes from far away; but support
     that comes after the slip does not undo it."""
@@ -166,6 +169,7 @@ PULL = {"name": "pull", "steps": 1, "boundary": {"b": {"tx": 0.2, "ty": 1.0}}}
 LET_GO = {"name": "let go", "steps": 2, "boundary": {"b": {"tx": 0.0, "ty": 0.0}}}
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_a_seam_that_is_cut_under_load(tmp_path: Path) -> None:
     """The end is as if it had been open from the start; half of the way half of the traction is left."""
     cut = pbem.run(make_seam([PULL, {"name": "cut", "steps": 2, "open": ["s1"]}], {}), tmp_path / "cut.h5")
@@ -180,6 +184,7 @@ def test_a_seam_that_is_cut_under_load(tmp_path: Path) -> None:
     assert lacks(cut).max() < 5e-4 and cut.energy.removed[-1] > 0 and cut.energy.dissipated[-1] == 0
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("operator", ["dense", "hierarchical"])
 def test_a_gap_that_is_bolted_stays(operator: Any, tmp_path: Path) -> None:
     """Welded as it gapes, it keeps its jump without the load, and springs back once it is left to its law."""
@@ -232,6 +237,7 @@ def test_a_construction_is_gone_on_with(tmp_path: Path) -> None:
     assert np.abs(joint.slip[2]).max() > 1e-4
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_a_body_that_floats_goes_on_floating(tmp_path: Path) -> None:
     """Nothing holds two blocks that are pulled in balance; without the lower one the upper is as it is alone."""
     pulled = {"rb": {"tx": 1.0}, "lb": {"tx": -1.0}}
@@ -245,6 +251,7 @@ def test_a_body_that_floats_goes_on_floating(tmp_path: Path) -> None:
     np.testing.assert_allclose(results.displacement[-1, own][at[0]], single.displacement[-1][at[1]], atol=1e-12)
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_a_hanging_block_is_taken_away(tmp_path: Path) -> None:
     """What is left hangs by its own weight, and what the other had stored is gone with it."""
     cut = {"name": "cut", "steps": 2, "remove": ["lower"]}
@@ -259,6 +266,7 @@ def test_a_hanging_block_is_taken_away(tmp_path: Path) -> None:
     assert results.balance.whole_relative.max() < 1e-3
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_a_block_that_loses_its_hold_is_refused(tmp_path: Path) -> None:
     case = make_seam([REST, {"name": "cut", "open": ["s1", "s2"]}], {}, gravity={"gy": -1.0})
     case["materials"]["m"]["density"] = 1.0
@@ -289,6 +297,7 @@ def test_names_are_checked(tmp_path: Path) -> None:
         assert text in said
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_tractions_on_a_wall_keep_their_axes(tmp_path: Path) -> None:
     mixed = [{"remove": ["lower"], "boundary": {"s1": {"tx": 1.0}, "s2": {"tn": 1.0, "ty": 2.0}}},
              {"boundary": {"s1": {"tn": 1.0}}}]
@@ -299,6 +308,7 @@ def test_tractions_on_a_wall_keep_their_axes(tmp_path: Path) -> None:
     assert "stages[2].boundary.s1: found tractions on 's1' along other axes than in a stage before" in said
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("given", [{"ty": 1.0}, {"tn": {"expression": "-y"}, "ts": {"expression": "-x"}}])
 def test_a_net_force_on_a_wall_is_refused(given: dict[str, Any], tmp_path: Path) -> None:
     """That of a unit traction on a circle of radius 1 is its length; the core, which is gone, bears none of it."""
@@ -329,6 +339,7 @@ def test_the_gap_around_what_was_removed_is_no_jump(gap: float, tmp_path: Path) 
     assert errors.relative["jumps"][-1] == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("stiffness", [{}, {"normal_stiffness": 1e4, "tangential_stiffness": 1e4}])
 @pytest.mark.parametrize("rock_first", [False, True])
 def test_what_is_removed_first_may_have_another_stress(
@@ -351,6 +362,7 @@ def test_what_is_removed_first_may_have_another_stress(
     np.testing.assert_allclose(left, 0.0, atol=1e-6 * np.abs(energy.removed).max())
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("steps", [1, 2])
 @pytest.mark.parametrize("stressed", ["rock", "ore"])
 def test_what_opens_first_between_different_stresses_releases_the_same_with_a_joint(
@@ -372,6 +384,7 @@ def test_what_opens_first_between_different_stresses_releases_the_same_with_a_jo
         assert found == pytest.approx(expected, rel=1e-6), name
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("turn", [0.0, 30.0])
 @pytest.mark.parametrize("tractions_first", [False, True])
 def test_a_wall_whose_load_comes_to_be_along_other_axes(tractions_first: bool, turn: float, tmp_path: Path) -> None:
@@ -421,6 +434,7 @@ def dig_out(steps: int, **tables: object) -> dict[str, object]:
     }
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_half_of_a_heavy_inclusion_removed_from_a_plane_is_half_of_its_weight(tmp_path: Path) -> None:
     results = pbem.run(dig_out(2), tmp_path / "dig.h5")
     stress = results.interior.stress

@@ -24,6 +24,8 @@ from scripts.torture.runs import run_sample
 from tests.verification.test_limit_load import write_pushed_block
 from tests.verification.test_settling import Listener
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 
 def begin(text: str) -> tuple[Problem, TangentOperator, Memory, Load]:
     """A case whose first stage is solved, and the load of its second one."""

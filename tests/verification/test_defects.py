@@ -21,6 +21,8 @@ from pbem.exact import conforming_load, conforming_pressure
 from pbem.results.describe import describe_results
 from pbem.results.reader import Results
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 CASES = Path(__file__).parent.parent / "defects"
 MODULUS = 1000.0 / (1 - 0.3**2)  # of the pins
 Solve = Callable[..., Results]

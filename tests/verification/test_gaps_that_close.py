@@ -11,6 +11,8 @@ import pytest
 
 import pbem
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 GAP = 2e-3
 
 

@@ -30,6 +30,8 @@ from tests.verification.proofs.proof import write_case
 from tests.verification.rigid_sample import UNMOVED, compare_pressures, find_persson_force, write_pin
 from tests.verification.test_settling import BLOCKS, Listener, run
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 
 def write_pushed_block(shear: float, law: dict[str, float], unit: float = 1.0, shift: float = 0.0) -> str:
     """A block of 2 x 1 on another one, pressed by 1 and then pushed; unit: of lengths."""

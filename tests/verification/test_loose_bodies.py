@@ -17,6 +17,8 @@ from pbem.errors import ConvergenceError
 from pbem.results.reader import Results
 from tests.parallel.launch import launch_snippet
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 GAP, PRESSED = 1e-3, 1e-2
 
 

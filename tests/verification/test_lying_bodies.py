@@ -15,6 +15,8 @@ from pbem.results.reader import Results
 from tests.parallel.launch import launch_snippet
 from tests.verification.test_settling import Listener
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 # Principal stresses of a ratio of more than a third open a round hole everywhere.
 SPACE = """
 title = "tight discs of other stiffness in a plane under tension"

@@ -33,6 +33,7 @@ def at(point: complex) -> list[float]:
     return [float(point.real), float(point.imag)]
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize(("shift", "turn"), [(0j, 1 + 0j), (1e6 - 3e5j, 20 * np.exp(0.6j))])
 @pytest.mark.parametrize("operator", ["dense", "hierarchical"])
 def test_three_conditions(shift: complex, turn: complex, operator: str, tmp_path: Path) -> None:
@@ -51,6 +52,7 @@ def test_three_conditions(shift: complex, turn: complex, operator: str, tmp_path
     assert np.abs(results.reactions["corner"]).max() < 1e-6 * PULL * abs(turn)
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_fewer_conditions_than_motions_leave_the_mean_of_the_others(tmp_path: Path) -> None:
     one = pbem.run(make_plate(point_supports={"corner": {"at": [0, 0], "ux": 0.0}}), tmp_path / "one.h5")
     none = pbem.run(make_plate(), tmp_path / "none.h5")
@@ -59,6 +61,7 @@ def test_fewer_conditions_than_motions_leave_the_mean_of_the_others(tmp_path: Pa
     np.testing.assert_allclose(one.traction, none.traction, atol=1e-9 * PULL)
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_a_block_that_slides_on_another(tmp_path: Path) -> None:
     """Frictionless faces hold a block along the normal; its support moves it along, which the slip shows."""
     names = ("bottom", "right", "seam", "left")
@@ -102,6 +105,7 @@ def test_loads_that_do_not_balance_are_refused_all_the_same() -> None:
         pbem.run(case, "none.h5")
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_supports_on_arcs_are_met_however_the_body_has_turned(angle: float, tmp_path: Path) -> None:
     """A rotation is no polynomial on an arc: what was taken for one left 3e-4 of the displacement at the supports."""
@@ -160,6 +164,7 @@ def make_hovering_block(unit: float, *stages: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("unit", [1.0, 1e-6])
 @pytest.mark.parametrize("resumed", [False, True])
 def test_faces_that_are_closed_stay_where_supports_have_moved_them(unit: float, resumed: bool, tmp_path: Path) -> None:
@@ -178,6 +183,7 @@ def test_faces_that_are_closed_stay_where_supports_have_moved_them(unit: float, 
     assert (seat.mode[-1] == 0).all()
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("unit", [1.0, 1e-6])
 def test_supports_do_not_move_bodies_into_each_other(unit: float, tmp_path: Path) -> None:
     down = {"point_supports": {"one": {"uy": -0.3 * unit}, "other": {"uy": -0.3 * unit}}}
@@ -188,6 +194,7 @@ def test_supports_do_not_move_bodies_into_each_other(unit: float, tmp_path: Path
     np.testing.assert_allclose(results.contact["seat"].opening[-1], 1e-4 * unit, rtol=1e-6)
 
 
+@pytest.mark.usefixtures("without_errors")
 def test_what_fluid_in_a_gap_does_as_supports_move_a_block(tmp_path: Path) -> None:
     """Forces in balance do no work on the way, whatever that is: external work stays what is stored."""
     case = make_hovering_block(1.0)
@@ -198,6 +205,7 @@ def test_what_fluid_in_a_gap_does_as_supports_move_a_block(tmp_path: Path) -> No
     np.testing.assert_allclose(energy.elastic, energy.elastic[0], rtol=1e-9)
 
 
+@pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 77.0])
 @pytest.mark.parametrize("unit", [1.0, 1e3])
 def test_supports_move_a_body_along_the_face_that_it_touches(degrees: float, unit: float, tmp_path: Path) -> None:

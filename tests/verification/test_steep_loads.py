@@ -15,6 +15,8 @@ import pbem
 from pbem.model.build import build_model
 from pbem.solve.problem.step import SilentReporter
 
+pytestmark = pytest.mark.usefixtures("without_errors")
+
 Tables = dict[str, Any]
 
 

@@ -28,6 +28,6 @@ def test_statuses_and_products_are_the_same_on_all_ranks(
 def test_groups_in_the_place_of_the_factors_take_the_same_search_on_all_ranks(
     tmp_path: Path, mpirun_snippet: Launch
 ) -> None:
-    results = run_hierarchical(mpirun_snippet, tmp_path, LAYERS, (1, 3), "-pbem_newton_bodies", "0", before=SMALL)
+    results = run_hierarchical(mpirun_snippet, tmp_path, LAYERS, (1, 2), "-pbem_newton_bodies", "0", before=SMALL)
     expect_same_search(results)
     assert results[0].convergence["products"].sum() > 40  # factors take 24

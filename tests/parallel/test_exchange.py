@@ -35,7 +35,7 @@ friction = 0.5
 [analysis]
 steps = 1
 """
-COUNTS = (100, 400)
+COUNTS = (60, 240)
 # Argument 1: folder; others: cases. The products with a vector that is drawn for the model, of mixed statuses, and what
 # the ranks exchanged for one.
 SNIPPET = """

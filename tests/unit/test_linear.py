@@ -16,7 +16,7 @@ from pbem.parallel import gather_parts, share_nodes, world
 from pbem.solve.petsc.linear import LinearSolver
 from pbem.solve.petsc.session import petsc_options
 
-method, *options = sys.argv[1:]
+methods, *options = sys.argv[1:]
 # A number that the ranks cannot share equally.
 rows = 13
 first, last = share_nodes(np.ones(rows), world.size)[world.rank:world.rank + 2]
@@ -24,8 +24,9 @@ own = np.arange(last - first)
 singular = np.random.default_rng(1).standard_normal((rows, rows))
 regular = singular + 5 * np.eye(rows)
 singular[:, 5] = 0
-said = []
-with petsc_options(dict(option.split("=") for option in options)):
+
+def solve(method):
+    said = []
     solver = LinearSolver(world, method, len(own), rows, lambda part: matrix[first:last] @ gather_parts(world, part))
     for matrix in (singular, regular, np.eye(rows)):
         solver.begin_filling((np.full(len(own), len(own)), np.full(len(own), rows - len(own))))
@@ -45,20 +46,21 @@ with petsc_options(dict(option.split("=") for option in options)):
         except ConvergenceError as error:
             said.append(error.reason)
     solver.destroy()
-for each in world.gather(said) or ():
-    print(*each, sep=", ")
+    return said
+
+with petsc_options(dict(option.split("=") for option in options)):
+    for method in methods.split(","):
+        for each in world.gather(solve(method)) or ():
+            print(*each, sep=", ")
 """
 
 Launch = Callable[..., subprocess.CompletedProcess[str]]
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
-@pytest.mark.parametrize("method", ["lu", "mumps"])
-def test_an_operator_without_factors_is_singular_on_all_ranks(
-    method: str, ranks: int, mpirun_snippet: Launch
-) -> None:
-    done = mpirun_snippet(ranks, SINGULAR_THEN_REGULAR, method, timeout=40.0)
-    assert done.stdout.splitlines() == ranks * ["singular tangent, solved, solved"], done.stderr
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_an_operator_without_factors_is_singular_on_all_ranks(ranks: int, mpirun_snippet: Launch) -> None:
+    done = mpirun_snippet(ranks, SINGULAR_THEN_REGULAR, "lu,mumps", timeout=40.0)
+    assert done.stdout.splitlines() == 2 * ranks * ["singular tangent, solved, solved"], done.stderr
 
 
 def test_a_preconditioner_of_the_users_own_is_not_asked_for_what_mumps_knows(mpirun_snippet: Launch) -> None:

@@ -142,8 +142,10 @@ def make_body(rng: random.Random, scheme: str) -> tuple[float, dict[str, Trace],
 KEYS = (("tx", "ty"), ("tn", "ts"), ("pressure",), ("ux", "uy"), ("un", "us"), ("un", "ts"), ("us", "tn"))
 
 
-@pytest.mark.parametrize("shift", range(len(KINDS)))
-@pytest.mark.parametrize("keys", KEYS, ids="_".join)
+# With two shifts each key has values of each kind; with both, in other schemes and on other curves, the next key.
+@pytest.mark.parametrize(("keys", "shift"), [
+    (keys, (number + more) % len(KINDS)) for number, keys in enumerate(KEYS) for more in (0, 3)
+])  # fmt: skip
 def test_conditions_at_the_nodes(keys: tuple[str, ...], shift: int, tmp_path: Path) -> None:
     """The four curves have four kinds of values, in turn; from a file, or in Python."""
     rng = random.Random(f"{keys} {shift}")

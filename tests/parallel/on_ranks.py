@@ -25,7 +25,9 @@ pbem.driver.make_estimator = lambda model, mesh, *_: Estimator(model, mesh, None
 sys.exit(main(sys.argv[1:]))
 """
 
-# Commands of the program one after the other, on the same ranks; what each rank writes is kept apart.
+# Commands of the program one after the other, on the same ranks, each within what `prepare` makes of its name; what
+# each rank writes is kept apart.
+PREPARE_NOTHING = "from contextlib import nullcontext as prepare\n"
 ONE_BY_ONE = """
 import contextlib, io, json, os, sys
 from pathlib import Path
@@ -36,7 +38,7 @@ ended = {}
 for name, (folder, arguments) in json.loads(Path(sys.argv[1]).read_text()).items():
     os.chdir(folder)
     out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+    with prepare(name), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(arguments)
     ended[name] = world.gather((code, out.getvalue(), err.getvalue()))
 if world.rank == 0:
@@ -46,14 +48,16 @@ if world.rank == 0:
 
 def run_one_by_one(
     snippet: Launch, ranks: int, commands: Mapping[str, tuple[Path, Sequence[str]]], folder: Path,
-    timeout: float = TIMEOUT,
+    timeout: float = TIMEOUT, before: str = PREPARE_NOTHING,
 ) -> dict[str, subprocess.CompletedProcess[str]]:
     """What becomes of commands `pbem arguments...` in folders of their own, by one launch: to start takes longer than
-    a small case. All ranks have to return the same code; outputs are those of all ranks, one after the other."""
+    a small case. All ranks have to return the same code; outputs are those of all ranks, one after the other.
+
+    before: a piece of Python that comes first, and defines `prepare`."""
     listed, told = folder / "commands.json", folder / "ended.json"
     given = {name: (str(where), list(arguments)) for name, (where, arguments) in commands.items()}
     listed.write_text(json.dumps(given))
-    done = snippet(ranks, ONE_BY_ONE, listed, told, timeout=timeout)
+    done = snippet(ranks, before + ONE_BY_ONE, listed, told, timeout=timeout)
     assert done.returncode == 0, done.stdout + done.stderr
     ended = {}
     for name, by_rank in json.loads(told.read_text()).items():

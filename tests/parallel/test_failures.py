@@ -12,36 +12,46 @@ import pytest
 
 from pbem.results.reader import open_results
 from tests.cli.cli_sample import BLOCKS
+from tests.parallel.launch import launch_snippet
+from tests.parallel.on_ranks import run_one_by_one
 
 Launch = Callable[..., subprocess.CompletedProcess[str]]
 
 # Seconds until all ranks have ended; starting the program takes about two of them, more on a busy machine.
 SOON = 40.0
 
-# The command line with a function of the program replaced on one rank (-1: on all), where it raises at its n-th call.
-BROKEN = """
+# A function of the program replaced on one rank (-1: on all), where it raises at its n-th call.
+BREAK = """
 import importlib, sys
-from pbem.cli import main
+from contextlib import contextmanager
 from pbem.errors import ConvergenceError
 from pbem.parallel import world
 
-rank, module, name, calls, error, *arguments = sys.argv[1:]
-owner = importlib.import_module(module)
-for part in name.split(".")[:-1]:
-    owner = getattr(owner, part)
-name = name.split(".")[-1]
-whole = getattr(owner, name)
-done = 0
+@contextmanager
+def break_function(rank, module, name, calls, error):
+    owner = importlib.import_module(module)
+    for part in name.split(".")[:-1]:
+        owner = getattr(owner, part)
+    name = name.split(".")[-1]
+    whole = getattr(owner, name)
+    done = 0
 
-def broken(*given, **named):
-    global done
-    done += 1
-    if done >= int(calls) and int(rank) in (-1, world.rank):
-        raise eval(error)
-    return whole(*given, **named)
+    def broken(*given, **named):
+        nonlocal done
+        done += 1
+        if done >= int(calls) and int(rank) in (-1, world.rank):
+            raise eval(error)
+        return whole(*given, **named)
 
-setattr(owner, name, broken)
-sys.exit(main(arguments))
+    setattr(owner, name, broken)
+    yield
+    setattr(owner, name, whole)
+"""
+# The command line within it.
+BROKEN = BREAK + """
+from pbem.cli import main
+with break_function(*sys.argv[1:6]):
+    sys.exit(main(sys.argv[6:]))
 """
 
 # A block that is pressed, then pushed by more than friction carries.
@@ -134,20 +144,43 @@ def test_a_run_that_finds_no_equilibrium_returns_3_on_all_ranks(
     np.testing.assert_allclose(results.reactions["bottom"][-1], [-0.8 * results.steps.factor[-1], 2.0], rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("error", "reason"),
-    [("ConvergenceError('linear solver', 'INFOG(1) = -9')", "linear solver: "),
-     ("ConvergenceError('singular tangent', 'no factors')", "singular tangent: ")],
-)
+# Bonds that fail one after the other under a push that all of them together would bear.
+UNZIPS = SLIDES_AWAY.replace(
+    "friction = 0.2", "friction = 0.2\ncohesion = 0.15\ntensile_strength = 0.5\ncohesion_lost = true"
+).replace("tx = 0.4", "tx = 0.33")
+SOLVE = ("-1", "pbem.solve.petsc.linear", "LinearSolver.solve_columns", "2")
+REASONS = {"linear solver: ": "ConvergenceError('linear solver', 'INFOG(1) = -9')",
+           "singular tangent: ": "ConvergenceError('singular tangent', 'no factors')"}  # fmt: skip
+# Runs that end as not converged, by their names: the case, and what is broken of the program.
+NOT_CONVERGED = {reason: (BLOCKS, (*SOLVE, error)) for reason, error in REASONS.items()} | {
+    f"{name} on {rank}": (
+        UNZIPS, (str(rank), "pbem.solve.steps.ends", name, "1", "ConvergenceError('asked', 'on this rank')"))
+    for name in ("can_balance", "find_balanced_fraction") for rank in (0, 1)
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def not_converged(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, subprocess.CompletedProcess[str]]]:
+    """Where these ran on two ranks, and what became of them; by one launch, as each leaves the ranks as they were."""
+    folder, commands = tmp_path_factory.mktemp("not_converged"), {}
+    for number, (name, (text, _)) in enumerate(NOT_CONVERGED.items()):
+        (where := folder / str(number)).mkdir()
+        (where / "case.toml").write_text(text)
+        commands[name] = where, ("run", "case.toml", "--quiet")
+    breaks = {name: broken for name, (_, broken) in NOT_CONVERGED.items()}
+    before = f"{BREAK}\nbreaks = {breaks!r}\nprepare = lambda name: break_function(*breaks[name])\n"
+    ended = run_one_by_one(launch_snippet, 2, commands, folder, before=before)
+    return {name: (commands[name][0], done) for name, done in ended.items()}
+
+
+@pytest.mark.parametrize("reason", REASONS)
 def test_a_linear_solver_that_fails_ends_with_its_reason(
-    error: str, reason: str, folder: Path, mpirun_snippet: Launch
+    reason: str, not_converged: dict[str, tuple[Path, subprocess.CompletedProcess[str]]]
 ) -> None:
-    broken = "pbem.solve.petsc.linear", "LinearSolver.solve_columns"
-    arguments = ("-1", *broken, "2", error, "run", "blocks.toml", "--quiet")
-    done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
+    where, done = not_converged[reason]
     assert done.returncode == 3, done.stderr
     assert done.stderr.count(f"pbem: not converged: {reason}") == 1
-    assert open_results(folder / "blocks.h5").failure.startswith(reason)
+    assert open_results(where / "case.h5").failure.startswith(reason)
 
 
 # MUMPS is kept from asking for more room (its ICNTL(14)); GMRES is not let begin.
@@ -190,22 +223,12 @@ def test_a_step_that_cannot_be_stored_ends_all_ranks_and_keeps_those_before(
     assert "No space left on device" in results.failure
 
 
-# Bonds that fail one after the other under a push that all of them together would bear.
-UNZIPS = SLIDES_AWAY.replace(
-    "friction = 0.2", "friction = 0.2\ncohesion = 0.15\ntensile_strength = 0.5\ncohesion_lost = true"
-).replace("tx = 0.4", "tx = 0.33")
-
-
 @pytest.mark.parametrize("name", ["can_balance", "find_balanced_fraction"])
 def test_what_forces_could_balance_is_asked_on_the_first_rank_alone(
-    name: str, folder: Path, mpirun_snippet: Launch
+    name: str, not_converged: dict[str, tuple[Path, subprocess.CompletedProcess[str]]]
 ) -> None:
-    (folder / "away.toml").write_text(UNZIPS)
-    told = []
-    for rank in (0, 1):
-        arguments = (str(rank), "pbem.solve.steps.ends", name, "1", "ConvergenceError('asked', 'on this rank')")
-        done = mpirun_snippet(2, BROKEN, *arguments, "run", "away.toml", "--quiet", "--force", cwd=folder, timeout=SOON)
-        assert done.returncode == 3, done.stderr
-        told.append(done.stderr)
+    ended = [not_converged[f"{name} on {rank}"][1] for rank in (0, 1)]
+    assert [done.returncode for done in ended] == [3, 3], [done.stderr for done in ended]
+    told = [done.stderr for done in ended]
     # It is asked, and what the first rank finds holds for both: the second one is not.
     assert "asked" in told[0] and "asked" not in told[1] and told[1].count("bonds fail one after the other") == 1

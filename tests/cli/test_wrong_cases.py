@@ -1,4 +1,4 @@
-"""Wrong case files through the real command line: refused at once, all faults with their places, nothing written."""
+"""Wrong case files by the command line: refused at once, all faults with their places, nothing written."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from pbem.cli import main
 from tests.cli.cli_sample import BLOCKS
 from tests.parallel.launch import OUTER_JOB
 
@@ -177,37 +178,42 @@ def run_alone(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]
 
 
 @pytest.mark.parametrize("what", WRONG)
-def test_a_wrong_case_is_refused_with_all_its_faults(what: str, tmp_path: Path) -> None:
+def test_a_wrong_case_is_refused_with_all_its_faults(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     text, faults = WRONG[what]
     (tmp_path / "wrong.toml").write_text(text)
-    done = run_alone(tmp_path, "run", "wrong.toml")
-    assert (done.returncode, done.stdout) == (2, ""), done.stderr
-    check_message(done.stderr, "wrong.toml", text, faults)
+    monkeypatch.chdir(tmp_path)
+    code, printed = main(["run", "wrong.toml"]), capsys.readouterr()
+    assert (code, printed.out) == (2, ""), printed.err
+    check_message(printed.err, "wrong.toml", text, faults)
     assert [path.name for path in tmp_path.iterdir()] == ["wrong.toml"]
 
 
-def test_checking_a_wrong_case_tells_the_same(tmp_path: Path) -> None:
+@pytest.mark.parametrize("command", [("run", "wrong.toml"), ("check", "wrong.toml", "--plot", "model.png")])
+def test_processes_of_both_commands_tell_the_same(command: tuple[str, ...], tmp_path: Path) -> None:
     text, faults = WRONG["many faults at once"]
     (tmp_path / "wrong.toml").write_text(text)
-    done = run_alone(tmp_path, "check", "wrong.toml", "--plot", "model.png")
+    done = run_alone(tmp_path, *command)
     assert (done.returncode, done.stdout) == (2, ""), done.stderr
     check_message(done.stderr, "wrong.toml", text, faults)
     assert [path.name for path in tmp_path.iterdir()] == ["wrong.toml"]
 
 
-def test_an_earlier_result_is_left_alone(tmp_path: Path) -> None:
+def test_an_earlier_result_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "plate.toml").write_text(PLATE)
-    assert run_alone(tmp_path, "run", "plate.toml", "--quiet").returncode == 0
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "plate.toml", "--quiet"]) == 0
     result = (tmp_path / "plate.h5").read_bytes()
     (tmp_path / "plate.toml").write_text(change(PLATE, ("young = 1.0", "young = -1.0")))
-    assert run_alone(tmp_path, "run", "plate.toml").returncode == 2
-    assert run_alone(tmp_path, "run", "plate.toml", "--resume").returncode == 2
+    assert main(["run", "plate.toml"]) == 2
+    assert main(["run", "plate.toml", "--resume"]) == 2
     assert (tmp_path / "plate.h5").read_bytes() == result
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plate.h5", "plate.toml"]
 
 
-# By the reader, by the topology, by the supports.
-@pytest.mark.parametrize("what", ["no TOML", "a crack outside", "nothing that holds a body"])
+# By the reader, and by what is found of the model.
+@pytest.mark.parametrize("what", ["no TOML", "nothing that holds a body"])
 def test_two_ranks_refuse_a_wrong_case_once(what: str, tmp_path: Path, mpirun: Launch) -> None:
     text, faults = WRONG[what]
     (tmp_path / "wrong.toml").write_text(text)

@@ -117,7 +117,7 @@ def match(found: Complex, expected: Complex, tolerance: float) -> Integer:
     return np.asarray(which)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(36))
 def test_a_plate_of_round_numbers(seed: int) -> None:
     case = draw_plate(seed)
     still = find_ends(lay_mesh(move_case(case, STILL, 1.0)))
@@ -128,7 +128,7 @@ def test_a_plate_of_round_numbers(seed: int) -> None:
         match(found - found.mean(), expected, 1e-9 * move.length * np.abs(still).max())
 
 
-@pytest.mark.parametrize("seed", [*range(30), 231])
+@pytest.mark.parametrize("seed", [*range(18), 231])
 def test_a_stack_of_round_numbers(seed: int) -> None:
     """Its contact pairs, too."""
     case = draw_stack(seed)

@@ -13,7 +13,12 @@ from tests.verification.proofs import PROOFS, Proof
 VERIFY = Path(__file__).parents[2] / "scripts" / "verify.py"
 
 
-@pytest.mark.parametrize("proof", PROOFS, ids=lambda proof: proof.name)
+# One number of ranks; others are those of tests/parallel/test_ranks.py.
+ELSEWHERE = tuple(f"mixed model on {ranks}" for ranks in ("1 rank:", "2 ranks:", "4 ranks:"))
+
+
+@pytest.mark.parametrize("proof", [proof for proof in PROOFS if not proof.name.startswith(ELSEWHERE)],
+                         ids=lambda proof: proof.name)  # fmt: skip
 def test_proof(proof: Proof) -> None:
     outcome = proof.run()
     assert 0 <= outcome.error <= proof.tolerance, outcome

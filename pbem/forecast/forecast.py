@@ -123,15 +123,17 @@ def _find_largest(memory: dict[str, float], ranks: int, work: Work) -> float:
     return (sum(memory.values()) - memory.get(BESIDE, 0.0)) / ranks + measure_beside(work)
 
 
-# Bytes for each squared unknown of the dense operator, and for each unknown of the hierarchical one, that no run takes.
-MOST_DENSE, MOST_HIERARCHICAL = 120.0, 90e3
+# Bytes for each squared unknown of the dense operator, and for each unknown of the hierarchical one, that no run takes:
+# with bodies, whose factors are those of all of them together, and without.
+MOST_DENSE, MOST_HIERARCHICAL, MOST_OF_CRACKS = 120.0, 90e3, 30e3
 
 
 def exceeds_at_most(model: Model, mesh: Mesh, ranks: int, granted: float) -> bool:
     """Whether it takes a forecast to know that a rank has enough; granted: bytes for each rank."""
     unknowns = 2.0 * mesh.nodes
     hierarchical = choose_operator(model, mesh).name == "hierarchical"
-    most = MOST_HIERARCHICAL * unknowns if hierarchical else MOST_DENSE * unknowns**2
+    each = MOST_OF_CRACKS if mesh.crack.all() else MOST_HIERARCHICAL
+    most = each * unknowns if hierarchical else MOST_DENSE * unknowns**2
     return 2 * STARTED + most > granted
 
 

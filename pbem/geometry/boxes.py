@@ -121,6 +121,16 @@ class Meetings:
         return Meetings(self.boxes, self.other[which], self.box[which])
 
 
+def find_least(at: Integer, values: Real, count: int) -> Real:
+    """The least of the values (k,) that go with each of the numbers 0 .. count - 1, rising in at (k,); infinite where
+    there is none."""
+    least = np.full(count, np.inf)
+    first = np.flatnonzero(np.diff(at, prepend=-1))
+    if len(first):
+        least[at[first]] = np.minimum.reduceat(values, first)
+    return least
+
+
 def _match(first: Boxes, chosen: Integer, second: Boxes, own: Integer, size: float) -> tuple[Integer, Integer]:
     """Pairs (k,), each once, of boxes that share a cell of the given size, which none of them exceeds."""
     origin = second.low.min(axis=0)

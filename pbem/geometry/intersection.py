@@ -25,7 +25,7 @@ def surround(legs: Sequence[Leg]) -> tuple[complex, complex]:
 def project(leg: Leg, point: complex) -> tuple[float, float]:
     """Fraction of the leg nearest to the point, and the distance (of the carrying line or circle inside the leg)."""
     t = min(1.0, max(0.0, leg.project(point)))
-    return t, abs(complex(leg.point(np.array(t))) - point)
+    return t, abs(complex(leg.kind.place_fraction(leg, t)) - point)
 
 
 def measure_distances(legs: Sequence[Leg], points: Complex) -> Real:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.geometry.boxes import Boxes, Meetings
+from pbem.geometry.boxes import Boxes, Meetings, find_least
 from pbem.geometry.curve import Curve
 from pbem.geometry.nearness import Distances, Surroundings
 from pbem.geometry.tolerance import TIE
@@ -258,11 +258,9 @@ class LengthField:
 
     def _measure_from_tips(self, points: Complex, near: Meetings) -> Real:
         """What tips allow."""
-        allowed = np.full(len(points), np.inf)
         which, tip = near.other, near.box
         far = np.abs(points[which] - self._tips.point[tip])
-        np.minimum.at(allowed, which, self._tips.length[tip] + self._tips.slope[tip] * far)
-        return allowed
+        return find_least(which, self._tips.length[tip] + self._tips.slope[tip] * far, len(points))
 
     def _collect_tips(self, tips: Mapping[str, tuple[bool, bool]]) -> tuple[_Tips, Real]:
         """All tips and sharp corners, and per end of a leg (legs, 2) the least length of its elements, if it is a tip

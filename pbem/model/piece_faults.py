@@ -39,9 +39,11 @@ def _blame_own_keys(
 ) -> list[Fault]:
     """The faults of a law; of a piece those that the law of its trace alone would not have at its own keys, which cause
     them. judge: the faults of the table of the trace in its place."""
+    if not faults:
+        return faults
     given = case.given.get("interfaces", {})
     family = next((each for each, members in case.families.items() if name in members and each in given), None)
-    if not faults or family is None or name not in given:
+    if family is None or name not in given:
         return faults
     try:
         alone = set(judge(LawTable.model_validate(given[family])))

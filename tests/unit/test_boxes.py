@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.geometry.boxes import FEW, Boxes, Meetings
+from pbem.geometry.boxes import FEW, Boxes, Meetings, find_least
 from pbem.geometry.curve import Leg
 
 
@@ -82,3 +82,11 @@ def test_pairs_in_cells_of_several_sizes_are_found_once() -> None:
     low = np.array([[x, y] for x in (0.4, 0.9, 1.4) for y in (0.4, 0.9, 1.4)])
     boxes = Boxes(np.concatenate([low, [[0.0, 0.0]]]), np.concatenate([low + 0.25, [[1.9, 1.9]]]))
     assert list(zip(*boxes.find_pairs(), strict=True)) == [(number, 9) for number in range(9)]
+
+
+def test_the_least_of_what_goes_with_each_number_is_found() -> None:
+    random = np.random.default_rng(3)
+    at, values = np.sort(random.integers(0, 40, 60)), random.normal(size=60)
+    for some in (slice(0, 0), slice(0, 1), slice(0, 60)):
+        expected = [min(values[some][at[some] == number], default=np.inf) for number in range(41)]
+        assert find_least(at[some], values[some], 41).tolist() == expected

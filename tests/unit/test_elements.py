@@ -63,6 +63,19 @@ def test_they_begin_and_end_at_their_ends(elements: Elements) -> None:
     assert (ends == np.stack([elements.start, elements.end], axis=1)).all()
 
 
+def test_one_place_of_a_leg_is_that_among_many(elements: Elements) -> None:
+    fractions = np.array([0.0, 0.2, 0.75, 1.0])
+    for k in range(7):
+        leg = make_leg(elements.select([k]))
+        places = leg.point(fractions)
+        for t, place in zip(fractions.tolist(), places.tolist(), strict=True):
+            assert complex(leg.kind.place_fraction(leg, t)) == place
+            # Along the normal there that is the nearest place.
+            normal = leg.normals(np.array([place]))[0]
+            found, distance = project(leg, complex(place + 0.05 * normal))
+            expect_equal([found, distance], [t, 0.05], 1e-9)
+
+
 def test_the_slope_is_the_derivative_of_the_place(elements: Elements) -> None:
     # The map is analytic in s: differences along the imaginary axis and along the real one give the same.
     for h in (1e-4, 1e-4j):

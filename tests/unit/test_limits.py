@@ -6,9 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.errors import LaunchError
-from pbem.forecast.forecast import Forecast, note_memory, refuse_memory
+from pbem.forecast import forecast
+from pbem.forecast.forecast import Forecast, exceeds_at_most, note_memory, refuse_memory
 from pbem.forecast.limits import Limit, read_available, read_limits
+from pbem.mesh.generate import generate_mesh
 from pbem.solve.launch import memory
 from pbem.solve.launch.memory import judge_memory
 from tests.unit.results_sample import make_mesh, make_model
@@ -88,3 +91,38 @@ def test_a_run_is_refused_unless_the_user_wants_it(monkeypatch: pytest.MonkeyPat
     assert judge_memory(model, mesh, [[([], None)]], allowed=False) == ()
     (note,) = judge_memory(model, mesh, [[([Limit(1e12, "memory.max")], 1e8)] * 2], allowed=False)
     assert "can be had now" in note
+
+
+def write_cracks(operator: str) -> str:
+    """Cracks in a plane without end, none of them near to another."""
+    names = [f"c{k}" for k in range(100)]
+    lines = [f"{name} = {{ points = [[{k % 10}, {k // 10}], [{k % 10 + 0.5}, {k // 10 + 0.2}]], elements = 10 }}"
+             for k, name in enumerate(names)]
+    return "\n".join([
+        "[materials]\nrock = { young = 1e3, poisson = 0.2 }", "[curves]", *lines,
+        f'[regions]\nplane = {{ material = "rock", boundary = [], infinite = true, cracks = {names} }}',
+        "[interfaces]", *(f"{name} = {{ friction = 0.6 }}" for name in names), "[remote]\nsyy = -1.0",
+        f'[solver]\noperator = "{operator}"\n',
+    ])
+
+
+def write_case(name: str, operator: str) -> str:
+    return Path("cases", f"{name}.toml").read_text() + f'\n[solver]\noperator = "{operator}"\n'
+
+
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+@pytest.mark.parametrize("name", ["crack_field", "layers_pull", "cracks"])
+def test_what_no_run_takes_is_more_than_the_forecast(name: str, operator: str) -> None:
+    _, model = parse_model(write_cracks(operator) if name == "cracks" else write_case(name, operator))
+    mesh = generate_mesh(model)
+    for ranks in (1, 2, 8):
+        needed = forecast.make_forecast(model, mesh, ranks, timed=False).rank_memory
+        assert exceeds_at_most(model, mesh, ranks, needed)
+
+
+def test_cracks_alone_need_no_forecast_where_memory_is_ample() -> None:
+    # Factors of bodies take more for each unknown.
+    for text, needs in ((write_cracks("hierarchical"), False), (write_case("layers_pull", "hierarchical"), True)):
+        _, model = parse_model(text)
+        mesh = generate_mesh(model)
+        assert exceeds_at_most(model, mesh, 2, 2 * forecast.STARTED + 8e4 * mesh.nodes) == needs

@@ -125,6 +125,8 @@ class Kind(ABC):
 
     def place_fraction(self, e: Shape, t: Any) -> Any:
         """Points at t, exactly the ends at 0 and 1."""
+        if isinstance(t, float):  # of many legs one at a time, arrays of one number would take most of the time
+            return e.start if t == 0.0 else e.end if t == 1.0 else self.walk(e, t)
         return np.where(t == 0.0, e.start, np.where(t == 1.0, e.end, self.walk(e, t)))
 
     @abstractmethod

@@ -78,7 +78,7 @@ class Straight(Kind):
 
     def project(self, e: Shape, z: Any) -> Any:
         along = e.end - e.start
-        return ((z - e.start) * np.conj(along)).real / abs(along) ** 2
+        return ((z - e.start) * along.conjugate()).real / abs(along) ** 2
 
     def distance(self, e: Shape, z: Any) -> Any:
         along = e.end - e.start

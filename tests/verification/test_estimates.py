@@ -489,3 +489,38 @@ def test_reactions_of_slender_beams_with_linear_elements(
     assert 0.05 < error / abs(force) < 0.12
     assert 0.5 < error / np.linalg.norm(results.errors.reactions["root"][-1]) < 2.0
     assert 0.5 < error / abs(force) / results.errors.relative["reactions"][-1] < 2.0
+
+
+def test_a_contact_on_a_small_part_of_its_faces(tmp_path: Path) -> None:
+    """Hertz: a disc on a wide table, where the last elements that have pairs are half of the length of all of them."""
+    degrees, unit = 50.0, 1e3
+    turn = unit * np.exp(1j * np.deg2rad(degrees))
+    corners = turn * np.array([-2 - 1j, 2 - 1j, 2 + 0j, -2 + 0j, -2 - 1j])
+    sides = ("foot", "right", "face", "left")
+    curves: dict[str, Any] = {
+        name: {"points": [[float(at.real), float(at.imag)] for at in corners[k:k + 2]], "elements": 8}
+        for k, name in enumerate(sides)
+    }
+    center = [float((1j * turn).real), float((1j * turn).imag)]
+    for name, start, elements in (("lower", 180.0, 16), ("upper", 0.0, 13)):
+        curves[name] = {"center": center, "radius": unit, "angles": [degrees + start, degrees + start + 180],
+                        "elements": elements}
+    pressure = 1e-6 * turn / unit * -1j
+    results = pbem.run({
+        "materials": {"steel": {"young": 1.0, "poisson": 0.3}}, "curves": curves,
+        "regions": {"table": {"material": "steel", "boundary": list(sides)},
+                    "disc": {"material": "steel", "boundary": ["lower", "upper"]}},
+        "boundary": {"foot": {"ux": 0.0, "uy": 0.0},
+                     "upper": {"tx": float(pressure.real), "ty": float(pressure.imag)}},
+        "contacts": {"seat": {"between": ["face", "lower"], "law": "frictionless"}},
+        "analysis": {"steps": 1, "order": 3},
+    }, tmp_path / "disc.h5")
+    seat, force = results.contact["seat"], math.pi * 1e-6 * unit
+    half = math.sqrt(8 * force * unit * (1 - 0.3**2) / math.pi)
+    root = np.sqrt(np.clip(1 - (np.abs(seat.position @ np.array([1, 1j])) / half) ** 2, 0, None))
+    along = np.argsort(seat.arc_length)
+    square = (seat.traction_n[-1] + 2 * force / (math.pi * half) * root)[along] ** 2
+    where = seat.arc_length[along]
+    error = math.sqrt(np.trapz(square, where) / (where[-1] - where[0]))
+    assert 0.1 < error / results.errors.traction_n["seat"][-1] < 10
+    assert 1e-5 < results.errors.relative["jumps"][-1] < 1e-3

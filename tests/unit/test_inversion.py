@@ -90,8 +90,8 @@ def test_what_has_no_inverse_at_all(value: float) -> None:
 # A disc between two rigid plates, the upper one under a force: without friction a single pair of each side holds it.
 DISC = """
 materials.glass = { young = 20000.0, poisson = 0.2 }
-curves.upper = { center = [0, 0], radius = 25.0, angles = [0, 180], elements = 60 }
-curves.lower = { center = [0, 0], radius = 25.0, angles = [180, 360], elements = 60 }
+curves.upper = { center = [0, 0], radius = 25.0, angles = [0, 180], elements = 200 }
+curves.lower = { center = [0, 0], radius = 25.0, angles = [180, 360], elements = 200 }
 curves.top = { points = [[15, 25], [-15, 25]], elements = 1 }
 curves.bottom = { points = [[-15, -25], [15, -25]], elements = 1 }
 regions.disc = { material = "glass", boundary = ["upper", "lower"] }
@@ -116,12 +116,7 @@ class Counting(SilentReporter):
 
 
 @pytest.mark.usefixtures("without_errors")
-def test_a_plate_under_a_force_whose_pairs_are_in_another_group(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("pbem.solve.preconditioner.subdomains.ONE_GROUP", 0)  # as of larger models
-    monkeypatch.setattr("pbem.solve.preconditioner.subdomains.GROUP_ELEMENTS", 40)
-    monkeypatch.setattr("pbem.solve.preconditioner.subdomains.BODY_ELEMENTS", 40)
+def test_a_plate_under_a_force_whose_pairs_are_in_another_group(tmp_path: Path) -> None:
     case, counting = tmp_path / "disc.toml", Counting()
     case.write_text(DISC)
     results = pbem.run(case, tmp_path / "disc.h5", operator="hierarchical", reporter=counting)

@@ -115,7 +115,6 @@ class Counting(SilentReporter):
         self.linear.append(iteration.linear_iterations)
 
 
-@pytest.mark.usefixtures("without_errors")
 def test_a_plate_under_a_force_whose_pairs_are_in_another_group(tmp_path: Path) -> None:
     case, counting = tmp_path / "disc.toml", Counting()
     case.write_text(DISC)

@@ -17,12 +17,10 @@ from scripts.study_conditions import judge, main, make_setting
 
 # The search for the modes of a pin that lies along a node asks for the answers of many pairs: with products, for long.
 SLOW = "pin along a node"
-# Second solutions of pins settle in as many iterations; errors of pins are looked at elsewhere (test_estimates).
-WITHOUT_ERRORS = pytest.mark.usefixtures("without_errors")
 # Of each condition one setting, so that all schemes, both operators and models elsewhere have their turn.
 SETTINGS = [
     pytest.param(name, SCHEMES[k % 4], "hierarchical" if k % 7 == 3 and name != SLOW else "dense", k % 3,
-                 id=name.replace(" ", "_"), marks=WITHOUT_ERRORS if name.startswith("pin ") else ())
+                 id=name.replace(" ", "_"))
     for k, name in enumerate(CONDITIONS)
 ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,24 @@ def dump_configuration(model: Model) -> str:
     return json.dumps({key: value for key, value in to_plain(model).items() if key not in texts})
 
 
+# A network has a hundred thousand values: most are of these types, and stand for themselves.
+PLAIN = frozenset((str, bool, int, float, type(None)))
+
+
+@cache
+def _list_fields(kind: type) -> tuple[str, ...] | None:
+    """The names of a dataclass's fields; None of what is none."""
+    return tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else None
+
+
 def to_plain(value: Any) -> Any:
     """Dictionaries, lists, numbers and strings instead of dataclasses, mappings, tuples and arrays."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    kind = type(value)
+    if kind in PLAIN:
+        return value
+    names = _list_fields(kind)
+    if names is not None:
+        return {name: to_plain(getattr(value, name)) for name in names}
     if isinstance(value, Mapping):
         return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, complex):

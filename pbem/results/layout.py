@@ -257,13 +257,16 @@ def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: 
 def count_steps(file: h5py.File) -> int:
     """How many steps were stored completely: the shortest of all that grows with them."""
     counts: list[int] = []
-
-    def count(_: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.maxshape[:1] == (None,):
-            counts.append(len(item))
-
+    # Past h5py's own layer, as all files are asked for that when they are opened.
     for group in find_growing(file):
-        group.visititems(count)
+        def count(name: bytes, parent: h5py.h5g.GroupID = group.id) -> None:
+            item = h5py.h5o.open(parent, name)
+            if isinstance(item, h5py.h5d.DatasetID):
+                space = item.get_space()
+                if space.get_simple_extent_dims(True)[:1] == (h5py.h5s.UNLIMITED,):
+                    counts.append(space.get_simple_extent_dims()[0])
+
+        h5py.h5o.visit(group.id, count)
     return min(counts)
 
 

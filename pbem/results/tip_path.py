@@ -61,7 +61,8 @@ def trace_paths(
     point = np.where(end == 0, mesh.start[element], mesh.end[element])
     count = np.array([len(chain.elements) for chain in chains])
     loads = np.zeros(0, dtype=complex) if loads is None else loads
-    return [_trace_alike(mesh, tips, point[tips], [chains[tip] for tip in tips], loads)
+    places = sort_by_length(mesh)
+    return [_trace_alike(mesh, tips, point[tips], [chains[tip] for tip in tips], loads, places)
             for tips in (np.flatnonzero(count == length) for length in np.unique(count))]
 
 
@@ -70,7 +71,9 @@ def view_outward(mesh: Mesh, elements: Integer, outward: Bool) -> Elements:
     return mesh.geometry.select(elements).turn_back(~outward)
 
 
-def _trace_alike(mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain], loads: Complex) -> TipPaths:
+def _trace_alike(
+    mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain], loads: Complex, places: list[Places]
+) -> TipPaths:
     elements = np.array([chain.elements for chain in chains])
     outward = np.array([chain.outward for chain in chains])
     whole = np.array([chain.ends_in_tip for chain in chains])
@@ -78,7 +81,7 @@ def _trace_alike(mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain],
     start, end = seen.start - point[:, None], seen.end - point[:, None]
     inside, along = _reach_along(start, end, seen.directions(), whole)
     own = np.repeat(np.arange(len(tip)), inside), elements[np.arange(elements.shape[1]) < inside[:, None]]
-    clearance = measure_clearance(mesh, point, along, *own)
+    clearance = measure_clearance(mesh, point, along, *own, places)
     if len(loads):
         clearance = np.minimum(clearance, np.abs(point[:, None] - loads).min(axis=1))
     middle = np.abs(seen.move(point[:, None], np.array(1.0)).sample(np.zeros(1))[..., 0])
@@ -137,25 +140,45 @@ def _reach_along(
     return inside, np.where(every & whole, REACH_ALONG, REACH) * farthest
 
 
-def measure_clearance(mesh: Mesh, points: Complex, radius: Real, owner: Integer, own: Integer) -> Real:
-    """Distance of each point to the nearest element that is not its own; infinite beyond twice the radius.
+@dataclass(frozen=True)
+class Places:
+    """Elements (k,) of a mesh that are about as long as the longest of them, and a tree of their middles."""
 
-    owner, own (l,): points, and elements that are theirs.
-    """
+    elements: Integer
+    longest: float
+    tree: cKDTree
+
+
+def sort_by_length(mesh: Mesh) -> list[Places]:
+    """All elements, those together whose lengths are between the same powers of two times the shortest."""
     lengths = mesh.geometry.lengths
     middle = 0.5 * (mesh.start + mesh.end)
-    clearance = np.full(len(points), np.inf)
     classes = np.floor(np.log2(lengths / lengths.min())).astype(int)
-    left_out = owner * mesh.elements + own
+    found = []
     for number in np.unique(classes):
         members = np.flatnonzero(classes == number)
         tree = cKDTree(np.column_stack([middle[members].real, middle[members].imag]))
-        around = radius / REACH + lengths[members].max()
+        found.append(Places(members, float(lengths[members].max()), tree))
+    return found
+
+
+def measure_clearance(
+    mesh: Mesh, points: Complex, radius: Real, owner: Integer, own: Integer, places: list[Places] | None = None
+) -> Real:
+    """Distance of each point to the nearest element that is not its own; infinite beyond twice the radius.
+
+    owner, own (l,): points, and elements that are theirs. places: of `sort_by_length`, if they are known.
+    """
+    clearance = np.full(len(points), np.inf)
+    left_out = owner * mesh.elements + own
+    for each in sort_by_length(mesh) if places is None else places:
+        members, tree = each.elements, each.tree
+        around = radius / REACH + each.longest
         found = tree.query_ball_point(np.column_stack([points.real, points.imag]), around)
-        of = np.repeat(np.arange(len(points)), [len(each) for each in found])
+        of = np.repeat(np.arange(len(points)), [len(numbers) for numbers in found])
         if not len(of):
             continue
-        near = members[np.concatenate([np.asarray(each, dtype=np.int64) for each in found])]
+        near = members[np.concatenate([np.asarray(numbers, dtype=np.int64) for numbers in found])]
         others = ~np.isin(of * mesh.elements + near, left_out)
         of, near = of[others], near[others]
         np.minimum.at(clearance, of, mesh.geometry.select(near).distances(points[of, None])[:, 0])

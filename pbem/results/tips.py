@@ -203,19 +203,22 @@ def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
     pair_of[mesh.pairs.first[mesh.pairs.crack]] = np.flatnonzero(mesh.pairs.crack)
     groups: list[_Alike] = []
     loads = np.array([load.place for load in model.point_loads.values()], dtype=complex)
+    soft = _list_soft(model, mesh)
     for paths in trace_paths(mesh, element, number % 2, MOST_WHOLE, loads):
-        groups += _gather_alike(model, mesh, paths, number, pair_of)
+        groups += _gather_alike(model, mesh, paths, number, pair_of, soft)
     return TipRules(cracks, is_tip, gap, model, mesh, tuple(groups), interfaces)
 
 
-def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pair_of: Integer) -> list[_Alike]:
-    """Sort paths by what they look like."""
+def _gather_alike(
+    model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pair_of: Integer, soft_interfaces: Bool
+) -> list[_Alike]:
+    """Sort paths by what they look like; soft_interfaces: of `_list_soft`."""
     seen, place_of, direction, length = _see_from_tip(mesh, paths)
     region = mesh.region[paths.elements[:, 0]]
     tip = np.where(paths.outward, mesh.tip[paths.elements], np.array([0, 2, 1])[mesh.tip[paths.elements]])
     chord = seen.end - seen.start
     # The nodes of an element belong to one curve.
-    soft = _list_soft(model, mesh)[mesh.pairs.interface[pair_of[paths.elements[:, 0] * (mesh.order + 1)]]]
+    soft = soft_interfaces[mesh.pairs.interface[pair_of[paths.elements[:, 0] * (mesh.order + 1)]]]
     columns = np.column_stack([
         np.round(chord[:, 1:] / chord[:, :-1] / ALIKE), np.round(seen.turns / ALIKE), np.round(paths.cut_at / ALIKE),
         paths.cut, paths.near, paths.whole, tip, soft,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -141,7 +142,8 @@ def load_driver() -> Callable[..., Results]:
         raise LaunchError(f"MPI cannot be loaded: {error}; {_advise_to_load(error)}") from error
     fault = None
     try:
-        with load_at_once():
+        # Where it is there already, others have loaded it, whose objects may go.
+        with load_at_once(for_good="pbem.driver" not in sys.modules):
             from pbem.driver import run
     except ImportError as error:
         fault = f"a library cannot be loaded: {error}; {_advise_to_load(error)}"

@@ -37,7 +37,7 @@ def to_plain(value: Any) -> Any:
     kind = type(value)
     if kind in PLAIN:
         return value
-    names = _list_fields(kind)
+    names = _list_fields(kind)  # type: ignore[arg-type]
     if names is not None:
         return {name: to_plain(getattr(value, name)) for name in names}
     if isinstance(value, Mapping):

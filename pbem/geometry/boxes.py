@@ -121,7 +121,7 @@ class Meetings:
         return Meetings(self.boxes, self.other[which], self.box[which])
 
 
-def find_least(at: Integer, values: Real, count: int) -> Real:
+def take_least_of_each(at: Integer, values: Real, count: int) -> Real:
     """The least of the values (k,) that go with each of the numbers 0 .. count - 1, rising in at (k,); infinite where
     there is none."""
     least = np.full(count, np.inf)

@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.geometry.boxes import Boxes, Meetings, find_least
+from pbem.geometry.boxes import Boxes, Meetings, take_least_of_each
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
 from pbem.geometry.tolerance import TIE
@@ -132,7 +132,7 @@ class Surroundings:
         other_kind = np.full(len(points), np.inf)
         if self.is_mixed:
             other = self.is_crack[leg[at]] != self.is_crack[seen]
-            other_kind = find_least(at[other], far[other], len(points))
+            other_kind = take_least_of_each(at[other], far[other], len(points))
         distance, nearest = np.full(len(points), np.inf), np.full(len(points), -1)
         order = np.lexsort((far, at))
         head = order[np.flatnonzero(np.diff(at[order], prepend=-1))]

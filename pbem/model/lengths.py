@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.geometry.boxes import Boxes, Meetings, find_least
+from pbem.geometry.boxes import Boxes, Meetings, take_least_of_each
 from pbem.geometry.curve import Curve
 from pbem.geometry.nearness import Distances, Surroundings
 from pbem.geometry.tolerance import TIE
@@ -260,7 +260,7 @@ class LengthField:
         """What tips allow."""
         which, tip = near.other, near.box
         far = np.abs(points[which] - self._tips.point[tip])
-        return find_least(which, self._tips.length[tip] + self._tips.slope[tip] * far, len(points))
+        return take_least_of_each(which, self._tips.length[tip] + self._tips.slope[tip] * far, len(points))
 
     def _collect_tips(self, tips: Mapping[str, tuple[bool, bool]]) -> tuple[_Tips, Real]:
         """All tips and sharp corners, and per end of a leg (legs, 2) the least length of its elements, if it is a tip

@@ -44,8 +44,10 @@ def break_function(rank, module, name, calls, error):
         return whole(*given, **named)
 
     setattr(owner, name, broken)
-    yield
-    setattr(owner, name, whole)
+    try:
+        yield
+    finally:
+        setattr(owner, name, whole)
 """
 # The command line within it.
 BROKEN = BREAK + """

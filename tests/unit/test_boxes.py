@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.geometry.boxes import FEW, Boxes, Meetings, find_least
+from pbem.geometry.boxes import FEW, Boxes, Meetings, take_least_of_each
 from pbem.geometry.curve import Leg
 
 
@@ -89,4 +89,4 @@ def test_the_least_of_what_goes_with_each_number_is_found() -> None:
     at, values = np.sort(random.integers(0, 40, 60)), random.normal(size=60)
     for some in (slice(0, 0), slice(0, 1), slice(0, 60)):
         expected = [min(values[some][at[some] == number], default=np.inf) for number in range(41)]
-        assert find_least(at[some], values[some], 41).tolist() == expected
+        assert take_least_of_each(at[some], values[some], 41).tolist() == expected

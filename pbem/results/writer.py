@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 
@@ -53,6 +53,16 @@ from pbem.solve.problem.step import Former, InteriorValues, Iteration, Step, Unf
 
 # What ends a run though nothing is wrong with it.
 STOPPED = (MemoryError, StorageError, BrokenPipeError)
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A step, the one before it, and what is stored with it: energies, and estimated errors by name (see `append`)."""
+
+    step: Step
+    before: Step | None
+    energy: Energy
+    estimates: Mapping[str, Real]
 
 
 class ResultWriter:
@@ -145,7 +155,6 @@ class ResultWriter:
         self.last_step = last_step
         self.unfinished: Unfinished | None = None
         self.former: Former | None = None
-        self._before: Step | None = None
         self._latest = last_step
         self._storage = storage
         self._every = max(1, model.output_every)
@@ -155,7 +164,8 @@ class ResultWriter:
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
         self._hoop_stress = HoopStress(model, mesh)
         self._absence = Absence(model, mesh, points)
-        self._pending: Step | None = None
+        self._pending: Reached | None = None  # is to be stored if the run ends with it
+        self._tried: Reached | None = None  # is being appended
         self.appended = 0  # steps that are in the file for good
         self.notes: Iterable[str] = ()  # read whenever something is brought to the disk
         self._noted: set[str] = set()  # those that the open file has
@@ -164,9 +174,7 @@ class ResultWriter:
     def _file(self) -> h5py.File:
         return self._storage.file
 
-    def append(
-        self, step: Step, estimates: Mapping[str, Real] | None = None
-    ) -> tuple[str, ...]:
+    def append(self, step: Step, estimates: Mapping[str, Real] | None = None) -> tuple[str, ...]:
         """Store the step if it is its turn, and its iterations in any case; all of it is on the disk, or nothing.
 
         estimates: its estimated errors, of `pbem.results.estimates.to_rows`; NaN is stored without.
@@ -176,21 +184,19 @@ class ResultWriter:
         steps before.
         """
         drop_unfinished(self._file)
-        self._before, self._latest = self._latest, step
+        before, self._latest = self._latest, step
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         table = self._file["convergence"]
         # Files of earlier versions that are resumed have fewer columns.
         extend(table, repack_fields(np.array(rows, dtype=ITERATION)[list(table.dtype.names)]))
-        self._energy = self._balance.add(step)
-        self._estimates = estimates or {}
+        self._tried = reached = Reached(step, before, self._balance.add(step), estimates or {})
         fault = find_fault(group.law for group in self._balance.laws.strengths)
         if fault:
             raise LawError(fault)
         if step.is_due(self._every):
-            self._store(step)
-        else:
-            self._pending = step
+            self._store(reached)
         self._commit(f"step {step.number}")
+        self._pending, self._tried = None if step.is_due(self._every) else reached, None
         self.appended += 1
         # What has to move before it touches is noted with the model.
         runaway = None if self._model.closing and step.number == 1 else self._balance.runaway
@@ -217,15 +223,22 @@ class ResultWriter:
         self._storage.roll_back()
         self._noted.clear()
 
+    def _find_last(self) -> Reached | None:
+        """The step that the file ends with, if it has its iterations alone: after a commit that failed that is the
+        step before, or the step itself where it failed when all was on the disk."""
+        last, stored = (int(each[-1]) if len(each) else 0
+                        for each in (self._file["convergence"]["step"], self._file["steps/number"]))
+        either = (self._pending, self._tried)
+        return next((each for each in either if each and stored < each.step.number == last), None)
+
     def complete(self, interior: InteriorValues) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""
         if self._pending is not None:
-            self._pending = replace(self._pending, interior=interior)
+            self._pending = replace(self._pending, step=replace(self._pending.step, interior=interior))
 
-    def _store(self, step: Step) -> None:
-        self._pending = None
-        file, rows = self._file, self._storage.rows
-        write_former(file, self._before, step, self._pairs)
+    def _store(self, reached: Reached) -> None:
+        file, rows, step = self._file, self._storage.rows, reached.step
+        write_former(file, reached.before, step, self._pairs)
         hoop_stress, reactions = self._hoop_stress.evaluate(step), self._sum_reactions(step.traction)
         tips = self.tip_rules.evaluate_all(step) if self.tip_rules.cracks else {}
         gone = self._absence.list_faces(step.stage)
@@ -253,9 +266,9 @@ class ResultWriter:
         for kind, at_tips in tips.items():
             rows.append(f"all/tips/{kind}", at_tips)
         for name in rows.list_names("estimates"):
-            rows.append(f"estimates/{name}", self._estimates.get(name, np.nan))
+            rows.append(f"estimates/{name}", reached.estimates.get(name, np.nan))
         for kind in ENERGIES:
-            rows.append(f"energy/{kind}", getattr(self._energy, kind))
+            rows.append(f"energy/{kind}", getattr(reached.energy, kind))
         append_balance(rows, step)
         append_linearity(rows, step)
         if self._model.rigid:
@@ -290,8 +303,9 @@ class ResultWriter:
     @property
     def relative_errors(self) -> dict[str, Real]:
         """The estimated relative errors (k,) of the steps stored so far, by kind."""
-        if self._pending is not None:
-            self._store(self._pending)
+        pending, self._pending = self._pending, None
+        if pending is not None:
+            self._store(pending)
             self._commit("the last step")
         group = self._file["estimates"]
         return {name.removeprefix("relative_"): group[name][...] for name in group if name.startswith("relative_")}
@@ -322,13 +336,12 @@ class ResultWriter:
         if not self._storage.is_open:
             return
         try:
-            last = self._pending is not None
-            if self._pending is not None:
-                self._store(self._pending)
-            if self._append_notes() or last:
+            pending, self._pending = self._pending, None
+            if pending is not None:
+                self._store(pending)
+            if self._append_notes() or pending is not None:
                 self._storage.commit()
         except OSError as error:
-            self._pending = None
             self._roll_back()
             if status == "finished":
                 self.fail("StorageError", str(error), "stopped")
@@ -359,6 +372,8 @@ class ResultWriter:
         with suppress(Exception):
             if self._storage.is_open and self._storage.dirty:
                 self._roll_back()  # it ended within a step
+            if self._storage.is_open and self._tried is not None:
+                self._pending = self._find_last()
             if self._storage.is_open and isinstance(error, StopError) and error.unfinished is not None and not later:
                 write_unfinished(self._file, error.unfinished, self._pairs)
             self._close(reasons["status"], reasons)

@@ -13,7 +13,8 @@ import h5py
 import numpy as np
 import pytest
 
-from pbem.errors import ResultFileError, StorageError
+import pbem.results.writer
+from pbem.errors import LawError, ResultFileError, StorageError
 from pbem.results import journal, tail
 from pbem.results.output import check_output_path
 from pbem.results.reader import open_results
@@ -172,6 +173,76 @@ def test_a_full_disk_leaves_the_steps_before(
         expect_steps(path, len(STEPS))
         np.testing.assert_allclose(open_results(path).energy.elastic, energy, rtol=1e-12)
         path.unlink()
+
+
+SOME = make_model(every=3)
+DUE = (2, 3, 6)  # of the stages' six steps
+
+
+def append_up_to(writer: ResultWriter, first: int, last: int) -> None:
+    """Steps first to last, each with an error and a note of its own."""
+    for step in STEPS[first - 1 : last]:
+        writer.notes = [f"note {number}" for number in range(1, step.number + 1)]
+        writer.append(step, {"relative_displacement": np.array(0.01 * step.number)})
+
+
+def expect_some_steps(path: Path, last: int, energy: np.ndarray) -> None:
+    """The file holds the steps up to `last` that are due, that one, and the iterations of all."""
+    results = open_results(path)
+    numbers = sorted({number for number in DUE if number < last} | {last})
+    assert results.steps.number.tolist() == numbers
+    of = np.array(numbers) - 1
+    np.testing.assert_array_equal(results.displacement @ [1, 1j], [STEPS[k].displacement for k in of])
+    np.testing.assert_allclose(results.energy.elastic, energy[of], rtol=1e-12)
+    np.testing.assert_allclose(results.errors.relative["displacement"], 0.01 * np.array(numbers))
+    with h5py.File(path) as file:
+        assert np.unique(file["convergence"]["step"]).tolist() == list(range(1, last + 1))
+
+
+@pytest.mark.parametrize("number", [4, 5, 6])
+def test_a_step_without_room_is_not_stored_when_the_run_ends(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, energy: np.ndarray
+) -> None:
+    """At every write call of a step the file then ends with the one before, due or not, and has its note."""
+    path = tmp_path / "a.h5"
+    fault = Fault(monkeypatch, lambda: OSError(errno.ENOSPC, "No space left on device"), lasting=False)
+    ends, calls, whole = set(), 0, False
+    while not whole:
+        fault.allow(-1)
+        with suppress(StorageError), ResultWriter(path, SOME, MESH, 1, "3.18.5", force=True) as writer:
+            append_up_to(writer, 1, number - 1)
+            fault.allow(calls)
+            append_up_to(writer, number, number)
+            fault.allow(-1)
+            whole = True
+        results = open_results(path)
+        assert whole or f"no room for step {number} (No space left on device)" in results.failure
+        last = int(results.steps.number[-1])
+        assert number - 1 <= last <= number
+        expect_some_steps(path, last, energy)
+        assert [note for note in results.notes if note.startswith("note ")] == [f"note {i + 1}" for i in range(number)]
+        if not whole and last not in ends:
+            ends.add(last)
+            with ResultWriter.resume(path, SOME, MESH, 1, "3.18.5") as again:
+                append_up_to(again, last + 1, len(STEPS))
+            assert {*DUE, last} == set(open_results(path).steps.number.tolist())
+            with h5py.File(path) as file:
+                assert np.unique(file["convergence"]["step"]).tolist() == list(range(1, len(STEPS) + 1))
+        calls += 1
+    assert ends == {number - 1, number}, "before the change is complete, and after it"
+
+
+def test_a_law_that_fails_leaves_the_step_before_with_what_belongs_to_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, energy: np.ndarray
+) -> None:
+    path = tmp_path / "a.h5"
+    with pytest.raises(LawError, match="made up"), ResultWriter(path, SOME, MESH, 1, "3.18.5") as writer:
+        append_up_to(writer, 1, 5)
+        monkeypatch.setattr(pbem.results.writer, "find_fault", lambda _: "made up")
+        append_up_to(writer, 6, 6)
+    expect_some_steps(path, 5, energy)
+    with h5py.File(path) as file:
+        assert file["former"].attrs["number"] == 4
 
 
 def test_a_disk_that_stays_full_leaves_a_file_that_can_be_read(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbem.arrays import Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.geometry.tolerance import TIE
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -27,21 +28,37 @@ def sum_sizes(model: Model, mesh: Mesh, step: Step) -> Real:
     return np.bincount(curve, size, len(model.conditions)).astype(float)
 
 
-def bound_reactions(model: Model, step: Step) -> Real:
-    """The least errors (c, 2) of the forces along x and y on the outer curves that hold the bodies: what all external
-    forces together lack of balance, shared by these curves; zero where that is not known.
+def bound_reactions(model: Model, mesh: Mesh, step: Step) -> Real:
+    """The least errors (c, 2) of the forces along x and y on the outer curves: what all external forces together lack
+    of balance along an axis, shared by the curves whose force along it is not given; zero where that is not known.
 
     With linear elements slender beams hand on their loads by too little, on meshes of all lengths alike.
     """
-    holds = np.array([
-        "displacement" in condition.known or any(not isinstance(each, float) or each for each in condition.stiffness)
-        for condition in model.conditions.values()
-    ], dtype=bool)
-    supports = np.count_nonzero(holds) + len(model.point_supports)
-    if step.balance is None or not holds.any():
-        return np.zeros((len(holds), 2))
-    lacking = np.abs(np.nan_to_num(step.balance.whole[:2])) / supports
-    return np.where(holds[:, None], lacking, 0.0)
+    bears = _find_bearing(model, mesh)
+    if step.balance is None:
+        return np.zeros(bears.shape)
+    lacking = np.abs(np.nan_to_num(step.balance.whole[:2]))
+    return np.asarray(np.where(bears, lacking / np.maximum(bears.sum(axis=0), 1), 0.0))
+
+
+def _find_bearing(model: Model, mesh: Mesh) -> Bool:
+    """Whether the force of an outer curve along x or y (c, 2) is not given."""
+    nodes, curve = _list_outer_nodes(model, mesh)
+    normal, bears = mesh.normal[nodes], np.zeros((len(model.conditions), 2), dtype=bool)
+    for number, condition in enumerate(model.conditions.values()):
+        # Springs, or displacements: along the axes, or along the normal and the curve.
+        held = np.array([known == "displacement" or not isinstance(stiffness, float) or stiffness != 0.0
+                         for known, stiffness in zip(condition.known, condition.stiffness, strict=True)])
+        if condition.frame == "local":
+            own = normal[curve == number]
+            across = np.array([np.abs(own.real).max(initial=0.0), np.abs(own.imag).max(initial=0.0)]) > TIE
+            held = (held[0] & across) | (held[1] & across[::-1])
+        bears[number] = held
+    names = list(model.conditions)
+    for body in model.rigid.values():
+        if not body.tool:
+            bears[[names.index(each) for each in body.curves]] = [known == "motion" for known in body.known[:2]]
+    return bears
 
 
 def _list_outer_nodes(model: Model, mesh: Mesh) -> tuple[Integer, Integer]:

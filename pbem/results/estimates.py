@@ -217,7 +217,7 @@ class Comparison:
         KI, KII = (np.maximum(each, least) for each in factors)
         reactions = np.abs(np.stack([forces.real, forces.imag], axis=1))
         if not self._as_they_are:
-            reactions = np.maximum(reactions, bound_reactions(self._model, step))
+            reactions = np.maximum(reactions, bound_reactions(self._model, self._mesh, step))
         return Estimates(
             reactions, opening, slip, traction_n, traction_s, KI, KII,
             by * _largest(np.abs(moved[~beside.mesh.node_crack])),
@@ -247,17 +247,19 @@ class Comparison:
         opening, slip = (self._divide_jumps(name, mine, other, beside) for name in JUMPS)
         normal, tangential = self._subtract_tractions(mine, other, beside)
         weight = beside.mesh.pairs.weight
+        borne = weight * (other.traction_n**2 + other.traction_s**2)
         of = dict(self._others)
         found = []
         for name in sort_pairs(self._mesh):
             pairs = of.get(name, np.zeros(0, dtype=np.int64))
-            whole = max(weight[pairs].sum(), 1e-300)
+            whole, length = (float(weight[pairs] @ each) for each in (np.ones(len(pairs)), beside.seen[pairs]))
             largest = [_largest(each[pairs]) for each in (opening, slip)]
-            mean = [float(np.sqrt((weight[pairs] @ each[pairs] ** 2) / whole)) for each in (normal, tangential)]
             # Where the second solution has its pairs on the other face nothing is known. On faces that touch in a small
             # part what is not seen may be a few long elements at the ends of what is opposite.
-            of_length = float(weight[pairs] @ beside.seen[pairs]) >= 0.5 * float(weight[pairs].sum())
-            seen = of_length or np.count_nonzero(beside.seen[pairs]) >= 0.5 * len(pairs)
+            most = beside.seen[pairs] @ borne[pairs] >= 0.5 * borne[pairs].sum()
+            seen = length >= 0.5 * whole or (most and np.count_nonzero(beside.seen[pairs]) >= 0.5 * len(pairs))
+            along = max(whole if length >= 0.5 * whole else length, 1e-300)
+            mean = [float(np.sqrt((weight[pairs] @ each[pairs] ** 2) / along)) for each in (normal, tangential)]
             found.append([*largest, *mean] if len(pairs) and seen else [np.nan] * 4)
         table = np.array(found).reshape(-1, 4)
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]

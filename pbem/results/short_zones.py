@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
-from pbem.arrays import Bool, Integer, Real
+from pbem.arrays import Integer, Real
 from pbem.model.model import Model
 
 # Of jumps on up to so many pairs between pairs that stay together, an error of this part of the largest over their
@@ -17,41 +20,58 @@ MOST, PART = 4, 0.5
 LEAST = 1e-6
 
 
+@dataclass(frozen=True)
+class _Zone:
+    """Pairs (k,) of an interface that have moved, one after the other; ends: the ends of the interface that it reaches,
+    0 its start, 1 its end."""
+
+    interface: str
+    pairs: Integer
+    ends: tuple[int, ...]
+
+
 def bound_short_zones(model: Model, interfaces: Mapping[str, Integer], opening: Real, slip: Real) -> Real:
     """The least errors (m, 2) of opening and slip on zones of few pairs; 0 at other pairs.
 
-    interfaces: pairs of each, by arc length; opening (m,): since the start, slip (m,), lengths. A zone that an end of
-    its interface cuts off from one on the only other interface there, or that nothing bounds, is none.
+    interfaces: pairs of each, by arc length; opening (m,): since the start, slip (m,), lengths. A zone goes on around
+    the end of its interface on the only other interface there, or on the other end of the same. One that nothing
+    bounds is none.
     """
     jumps = np.abs(np.stack([opening, slip], axis=1))
     least = np.zeros_like(jumps)
-    moved: dict[str, Bool] = {}
-    for name, own in interfaces.items():
-        size = jumps[own].max(axis=1, initial=0.0)
-        moved[name] = size > LEAST * size.max(initial=0.0)
-    going_on = _find_going_on(model, moved)
-    for name, own in interfaces.items():
-        ends = np.flatnonzero(np.diff(np.concatenate([[0], moved[name].astype(np.int8), [0]])))
-        for first, last in ends.reshape(-1, 2).tolist():
-            whole = first == 0 and last == len(own)
-            cut_off = (first == 0 and (name, 0) in going_on) or (last == len(own) and (name, 1) in going_on)
-            if last - first <= MOST and not whole and not cut_off:
-                zone = own[first:last]
-                least[zone] = PART / (last - first) * jumps[zone].max(axis=0)
+    zones = [zone for name, own in interfaces.items() for zone in _list_zones(name, own, jumps[own].max(axis=1))]
+    meeting = _find_meeting(model, interfaces)
+    at = {(zone.interface, end): number for number, zone in enumerate(zones) for end in zone.ends}
+    stay = {end for end, other in meeting.items() if other not in at}
+    links = np.array([(number, at[meeting[end]]) for end, number in at.items() if end in meeting.keys() - stay],
+                     dtype=np.int64).reshape(-1, 2)
+    graph = sparse.coo_matrix((np.ones(len(links)), links.T), shape=(len(zones),) * 2)
+    _, label = csgraph.connected_components(graph, directed=False)
+    for group in np.unique(label):
+        own = [zone for zone, each in zip(zones, label, strict=True) if each == group]
+        bounded = any(len(zone.ends) < 2 or any((zone.interface, end) in stay for end in zone.ends) for zone in own)
+        pairs = np.concatenate([zone.pairs for zone in own])
+        if bounded and len(pairs) <= MOST:
+            least[pairs] = PART / len(pairs) * jumps[pairs].max(axis=0)
     return least
 
 
-def _find_going_on(model: Model, moved: Mapping[str, Bool]) -> set[tuple[str, int]]:
-    """Ends (0 start, 1 end) of interfaces at which one other interface begins or ends, with jumps up to there on both.
+def _list_zones(name: str, own: Integer, size: Real) -> list[_Zone]:
+    """The zones of an interface with pairs (k,) whose jumps have a size (k,)."""
+    moved = size > LEAST * size.max(initial=0.0)
+    changes = np.flatnonzero(np.diff(np.concatenate([[0], moved.astype(np.int8), [0]])))
+    return [_Zone(name, own[first:last], (0,) * (first == 0) + (1,) * (last == len(own)))
+            for first, last in changes.reshape(-1, 2).tolist()]
 
-    Those of contacts are ends of bodies.
-    """
+
+def _find_meeting(model: Model, interfaces: Mapping[str, Integer]) -> dict[tuple[str, int], tuple[str, int]]:
+    """For ends (0 start, 1 end) of interfaces the only other end there; those of contacts are ends of bodies."""
     # Ends that meet are one number: pbem.geometry.shape.join_ends.
-    meeting: dict[complex, list[tuple[str, int]]] = {}
-    for name in moved:
+    places: dict[complex, list[tuple[str, int]]] = {}
+    for name in interfaces:
         if name in model.interfaces:
             curve = model.curves[name]
-            meeting.setdefault(curve.start, []).append((name, 0))
-            meeting.setdefault(curve.end, []).append((name, 1))
-    return {end for ends in meeting.values() if len(ends) == 2 and all(moved[name][-at] for name, at in ends)
-            for end in ends}
+            places.setdefault(curve.start, []).append((name, 0))
+            places.setdefault(curve.end, []).append((name, 1))
+    pairs = [ends for ends in places.values() if len(ends) == 2]
+    return {one: other for ends in pairs for one, other in (ends, ends[::-1])}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -489,6 +490,32 @@ def test_reactions_of_slender_beams_with_linear_elements(
     assert 0.05 < error / abs(force) < 0.12
     assert 0.5 < error / np.linalg.norm(results.errors.reactions["root"][-1]) < 2.0
     assert 0.5 < error / abs(force) / results.errors.relative["reactions"][-1] < 2.0
+
+
+@pytest.mark.parametrize("local", [False, True], ids=["along the axes", "along the faces"])
+def test_what_is_out_of_balance_is_an_error_of_what_bears(local: bool, tmp_path: Path) -> None:
+    """Of a cantilever whose root is held in pieces, across all but along one of them, and whose end is a rigid curve
+    with given forces: what is lacking along the faces is all an error of that one piece."""
+    heights = [0.5, 0.375, 0.25, 0.125, 0.0]
+    across, along = ("un", "us") if local else ("ux", "uy")
+    curves: dict[str, Any] = {
+        "foot": {"points": [[0, 0], [20, 0]], "elements": 96}, "end": {"points": [[20, 0], [20, 0.5]], "elements": 4},
+        "top": {"points": [[20, 0.5], [0, 0.5]], "elements": 96}}
+    roots = [f"root {k}" for k in range(4)]
+    for name, (high, low) in zip(roots, pairwise(heights), strict=True):
+        curves[name] = {"points": [[0, high], [0, low]], "elements": 1}
+    results = pbem.run({
+        "materials": {"steel": {"young": 1e4, "poisson": 0.3, "plane": "stress"}}, "curves": curves,
+        "regions": {"beam": {"material": "steel", "boundary": list(curves)}},
+        "boundary": {**{name: {across: 0.0} for name in roots}, "root 3": {across: 0.0, along: 0.0},
+                     "end": {"rigid": {"fx": 0.0, "fy": 1e-3, "moment": 0.0}}},
+        "analysis": {"steps": 1, "order": 1},
+    }, tmp_path / "beam.h5")
+    error = abs(results.reactions["root 3"][-1, 1] + 1e-3)
+    assert 0.05 < error / 1e-3 < 0.12
+    assert 0.5 < error / results.errors.reactions["root 3"][-1, 1] < 2.0
+    for name in (*roots[:3], "end", "top"):  # given, or none
+        assert results.errors.reactions[name][-1, 1] < 1e-3 * error
 
 
 def test_a_contact_on_a_small_part_of_its_faces(tmp_path: Path) -> None:

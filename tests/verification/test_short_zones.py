@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -55,20 +56,48 @@ def test_a_corner_that_slips(order: int, unit: float, stress: float, tmp_path: P
         assert 0.3 < error / true[step] / results.errors.relative["jumps"][step] < 3.0
 
 
+def make_interfaces(curves: dict[str, tuple[complex, ...]]) -> tuple[Model, dict[str, np.ndarray[Any, Any]]]:
+    """Interfaces of nine pairs each along curves through points."""
+    model = cast(Model, SimpleNamespace(interfaces=curves, curves={
+        name: Curve(name, tuple(Leg(*ends, 3) for ends in pairwise(points))) for name, points in curves.items()}))
+    return model, {name: np.arange(9 * k, 9 * k + 9) for k, name in enumerate(curves)}
+
+
 def test_zones_that_are_short() -> None:
-    """Between pairs that stay: not all of an interface, nor what goes on on the next one, unless others meet there."""
-    curves = {"one": (0j, 1 + 0j), "next": (1 + 0j, 2 + 1j), "far": (5 + 0j, 6 + 0j), "short": (9 + 0j, 10 + 0j)}
-    model = cast(Model, SimpleNamespace(
-        curves={name: Curve(name, (Leg(*ends, 3),)) for name, ends in curves.items()}, interfaces=curves))
-    interfaces = {name: np.arange(9 * k, 9 * k + 9) for k, name in enumerate(curves)}
+    """Between pairs that stay: not all of an interface; with what goes on on the next one."""
+    model, interfaces = make_interfaces(
+        {"one": (0j, 1 + 0j), "next": (1 + 0j, 2 + 1j), "far": (5 + 0j, 6 + 0j), "short": (9 + 0j, 10 + 0j)})
     interfaces["short"] = np.arange(27, 30)
     slip, opening = np.zeros(30), np.zeros(30)
     slip[[0, 1]], slip[[7, 8, 9, 10]], slip[20], opening[21], slip[24:27], slip[27:] = -3e-3, 1.0, -2.0, 1e-3, 4.0, 1.0
+    slip[10] = 1.5
     least = bound_short_zones(model, interfaces, opening, slip)
     expected = np.zeros((30, 2))
-    expected[:2, 1], expected[24:27, 1] = PART / 2 * 3e-3, PART / 3 * 4
+    expected[:2, 1], expected[7:11, 1], expected[24:27, 1] = PART / 2 * 3e-3, PART / 4 * 1.5, PART / 3 * 4
     expected[20:22] = PART / 2 * np.array([1e-3, 2.0])
     np.testing.assert_allclose(least, expected)
-    slip[9:11] = 0.0  # the next one stays together
+    slip[11] = 1.0  # five pairs in all
+    expected[7:11] = 0.0
+    np.testing.assert_allclose(bound_short_zones(model, interfaces, opening, slip), expected)
+    slip[9:12] = 0.0  # the next one stays together
     expected[7:9, 1] = PART / 2
     np.testing.assert_allclose(bound_short_zones(model, interfaces, opening, slip), expected)
+    slip[:9], expected[:9] = 1.0, 0.0  # all of one slips, which is more than a few
+    np.testing.assert_allclose(bound_short_zones(model, interfaces, opening, slip), expected)
+    assert not bound_short_zones(model, interfaces, 0 * opening, 0 * slip).any()
+
+
+def test_a_short_zone_is_the_same_wherever_curves_begin() -> None:
+    """Two pairs on either side of a corner of a square: of one curve, of four, and with the corner as its seam."""
+    corners = (0j, 1 + 0j, 1 + 1j, 1j)
+    for turn in range(4):
+        own = [corners[(turn + k) % 4] for k in range(5)]
+        for curves in ({"all": tuple(own)}, {f"side {k}": tuple(own[k : k + 2]) for k in range(4)}):
+            model, interfaces = make_interfaces(curves)
+            order = {"all": np.arange(36)} if len(curves) == 1 else interfaces
+            first = 9 * ((4 - turn) % 4)  # pairs on both sides of the corner at the origin
+            slip = np.zeros(36)
+            slip[[first - 2, first - 1, first, first + 1]] = [1.0, 2.0, 2.0, 1.0]
+            least = bound_short_zones(model, order, 0 * slip, slip)
+            expected = np.where(slip > 0, PART / 4 * 2.0, 0.0)
+            np.testing.assert_allclose(least[:, 1], expected, err_msg=f"{turn}, {len(curves)} curves")

@@ -76,6 +76,10 @@ def test_one_place_of_a_leg_is_that_among_many(elements: Elements) -> None:
             expect_equal([found, distance], [t, 0.05], 1e-9)
 
 
+def test_a_leg_without_length_is_as_far_away_as_its_ends() -> None:
+    assert project(Leg(1 + 2j, 1 + 2j, 1), 4 + 6j) == (0.0, 5.0)
+
+
 def test_the_slope_is_the_derivative_of_the_place(elements: Elements) -> None:
     # The map is analytic in s: differences along the imaginary axis and along the real one give the same.
     for h in (1e-4, 1e-4j):

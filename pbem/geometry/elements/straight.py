@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,10 @@ class Straight(Kind):
 
     def project(self, e: Shape, z: Any) -> Any:
         along = e.end - e.start
-        return ((z - e.start) * along.conjugate()).real / abs(along) ** 2
+        square = abs(along) ** 2
+        if isinstance(square, float) and not square:  # numbers of Python are not divided by zero
+            return math.nan
+        return ((z - e.start) * along.conjugate()).real / square
 
     def distance(self, e: Shape, z: Any) -> Any:
         along = e.end - e.start

@@ -154,16 +154,21 @@ def test_many_pairs_are_solved_by_columns_of_those_that_change_or_by_new_factors
 
 
 def test_a_system_that_stays_the_same_is_counted_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its factors serve from one step to the next, as long as no tangent of the pairs changes."""
+    """Its factors serve from one step to the next, as long as no tangent of the pairs changes; another one costs what
+    its factors do, also where all columns are known."""
     monkeypatch.setattr(Effort, "allows", lambda *_: True)
-    problem, spent = make_blocks("lu"), []
+    problem, spent, columns, sizes = make_blocks("lu"), [], [], []
     tangent = condense(problem, few=False)
-    for seed in (0, 1, 1, 1, 2, 2):
+    for seed in (0, 1, 1, 1, 2, 2, 1, 1):
         law, load = draw_law(problem, seed), problem.evaluate_load(0, 0.1 + 0.1 * len(spent))
         tangent.solve(problem.constrain(law, load), load, law)
         spent.append(tangent.known.effort.spent)
+        columns.append(len(tangent.known.columns.known))
+        sizes.append(2 * np.count_nonzero((law.tangent != tangent.known.laws)[tangent.varying].any(axis=(1, 2))))
     tangent.destroy()
-    assert spent[0] < spent[1] == spent[2] == spent[3] < spent[4] == spent[5]
+    assert spent[0] < spent[1] == spent[2] == spent[3] < spent[4] == spent[5] < spent[6] == spent[7]
+    assert columns[5] == columns[6] and 0 < sizes[6] < 2 * columns[6]
+    assert spent[6] - spent[5] == pytest.approx(4 / 3 * sizes[6] ** 3)  # an LU factorisation by one rank, at half speed
 
 
 def test_old_factors_are_given_up_when_they_have_cost_as_much_as_new_ones() -> None:

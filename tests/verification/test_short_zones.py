@@ -12,7 +12,10 @@ import pytest
 
 import pbem
 from pbem.geometry.curve import Curve, Leg
+from pbem.mesh.carry import list_curve_elements
+from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
+from pbem.results import accuracy
 from pbem.results.short_zones import MOST, PART, bound_short_zones
 
 
@@ -54,6 +57,35 @@ def test_a_corner_that_slips(order: int, unit: float, stress: float, tmp_path: P
         error = abs(slips[step] - true[step])
         assert 0.3 < error / results.errors.slip["joint"][step] < 3.0
         assert 0.3 < error / true[step] / results.errors.relative["jumps"][step] < 3.0
+
+
+def test_the_accuracy_asked_for_halves_the_elements_that_slip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the first pass those with pairs that slip, whatever the energies tell; and the slip comes out so well."""
+    case, asked = make_block(1, 1, 1.0, 1.0), 0.3
+    joint = pbem.run(case, tmp_path / "first.h5").contact["joint"]
+    passes: list[tuple[Model, Mesh, dict[str, Any]]] = []
+    mark = accuracy.mark_elements
+
+    def record(model: Model, mesh: Mesh, *others: Any) -> dict[str, Any]:
+        passes.append((model, mesh, mark(model, mesh, *others)))
+        return passes[-1][-1]
+
+    monkeypatch.setattr(accuracy, "mark_elements", record)
+    case["analysis"]["accuracy"] = asked
+    results = pbem.run(case, tmp_path / "block.h5")
+    model, mesh, marked = passes[0]
+    halved = np.zeros(mesh.elements, dtype=bool)
+    for name, elements in list_curve_elements(model, mesh):
+        halved[elements] = marked[name]
+    pairs = mesh.pairs.slave
+    place = joint.position[joint.slip[2] != 0] @ [1, 1j]
+    slips = (np.abs(mesh.position[pairs, None] - place) < 1e-9).any(axis=1)
+    assert 0 < np.count_nonzero(slips) <= MOST < len(slips)
+    assert halved[pairs[slips] // (mesh.order + 1)].all()
+    assert results.errors.relative["jumps"].max() <= asked
+    finer = pbem.run(make_block(2, 4, 1.0, 1.0), tmp_path / "finer.h5")
+    slip, true = (np.abs(each.contact["joint"].slip[2:]).max() for each in (results, finer))
+    assert abs(slip - true) <= asked * true
 
 
 def make_interfaces(curves: dict[str, tuple[complex, ...]]) -> tuple[Model, dict[str, np.ndarray[Any, Any]]]:

@@ -186,9 +186,11 @@ class Comparison:
             estimates = self._know_nothing()
         else:
             energy = measure_energy(self._model, self._mesh, self._beside, step, second)
-            estimates = self._subtract(step, second, self._beside, energy)
+            least = self._bound_jumps(step)
+            estimates = self._subtract(step, second, self._beside, energy, least)
             self.energy = np.maximum(self.energy, energy)
-            self.jumps = np.maximum(self.jumps, self._locate_jumps(step, second, self._beside))
+            located = self._locate_jumps(step.contact, second.contact, self._beside, least)
+            self.jumps = np.maximum(self.jumps, located)
         return estimates, self._relate(estimates)
 
     def _know_nothing(self) -> Estimates:
@@ -196,8 +198,8 @@ class Comparison:
         return Estimates(**{each.name: nothing[each.name] for each in fields(Estimates) if nothing[each.name].ndim},
                          displacement=np.nan)
 
-    def _subtract(self, step: Step, second: Step, beside: Beside, energy: Real) -> Estimates:
-        """What the two solutions differ by, over the divisors (theory, 77)."""
+    def _subtract(self, step: Step, second: Step, beside: Beside, energy: Real, least_jumps: Real) -> Estimates:
+        """What the two solutions differ by, over the divisors (theory, 77); least_jumps: of `_bound_jumps`."""
         by, of_forces, of_factors = 1.0 / self._divisor, 1.0, 1.0
         if self._divisor > 1:
             square = energy.sum(axis=0) / self._modulus
@@ -206,7 +208,6 @@ class Comparison:
         forces = sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second)
         forces = forces / of_forces
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)
-        least_jumps = self._bound_jumps(step)
         of_zones = [least_jumps[own].max(axis=0) for own in self._interfaces]
         opening, slip = np.maximum([opening, slip], np.reshape(of_zones, (-1, 2)).T)
         both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
@@ -296,8 +297,9 @@ class Comparison:
 
         return subtract("traction_n"), subtract("traction_s")
 
-    def _locate_jumps(self, step: Step, second: Step, beside: Beside) -> Real:
-        """Estimated error of the jumps on each element of the run (e,), over the largest jump so far.
+    def _locate_jumps(self, mine: ContactState, other: ContactState, beside: Beside, least: Real) -> Real:
+        """Estimated error of the jumps on each element of the run (e,), over the largest jump so far; least: of
+        `_bound_jumps`.
 
         The mean over each coarse element is left out: it comes from elsewhere.
         """
@@ -305,10 +307,10 @@ class Comparison:
         element = beside.carry.nearest[pairs.slave] // (self._mesh.order + 1)
         own, of = np.unique(pairs.slave // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
-            least = self._bound_jumps(step).max(axis=1) / self.scales.jumps
-            np.maximum.at(result, self._mesh.pairs.slave // (self._mesh.order + 1), least)
+            at_least = least.max(axis=1) / self.scales.jumps
+            np.maximum.at(result, self._mesh.pairs.slave // (self._mesh.order + 1), at_least)
             for name in JUMPS:
-                errors = self._divide_jumps(name, step.contact, second.contact, beside) / self.scales.jumps
+                errors = self._divide_jumps(name, mine, other, beside) / self.scales.jumps
                 mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
                 errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
                 np.maximum.at(result, element, np.abs(errors))

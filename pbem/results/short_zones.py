@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,15 +43,12 @@ def bound_short_zones(model: Model, interfaces: Mapping[str, Integer], opening: 
     meeting = _find_meeting(model, interfaces)
     at = {(zone.interface, end): number for number, zone in enumerate(zones) for end in zone.ends}
     stay = {end for end, other in meeting.items() if other not in at}
-    links = np.array([(number, at[meeting[end]]) for end, number in at.items() if end in meeting.keys() - stay],
-                     dtype=np.int64).reshape(-1, 2)
-    graph = sparse.coo_matrix((np.ones(len(links)), links.T), shape=(len(zones),) * 2)
-    _, label = csgraph.connected_components(graph, directed=False)
-    for group in np.unique(label):
-        own = [zone for zone, each in zip(zones, label, strict=True) if each == group]
+    links = [(number, at[meeting[end]]) for end, number in at.items() if end in meeting and end not in stay]
+    for group in _join(len(zones), links):
+        own = [zones[number] for number in group]
         bounded = any(len(zone.ends) < 2 or any((zone.interface, end) in stay for end in zone.ends) for zone in own)
-        pairs = np.concatenate([zone.pairs for zone in own])
-        if bounded and len(pairs) <= MOST:
+        if bounded and sum(len(zone.pairs) for zone in own) <= MOST:
+            pairs = np.concatenate([zone.pairs for zone in own])
             least[pairs] = PART / len(pairs) * jumps[pairs].max(axis=0)
     return least
 
@@ -62,6 +59,15 @@ def _list_zones(name: str, own: Integer, size: Real) -> list[_Zone]:
     changes = np.flatnonzero(np.diff(np.concatenate([[0], moved.astype(np.int8), [0]])))
     return [_Zone(name, own[first:last], (0,) * (first == 0) + (1,) * (last == len(own)))
             for first, last in changes.reshape(-1, 2).tolist()]
+
+
+def _join(count: int, links: Sequence[tuple[int, int]]) -> list[list[int]]:
+    """The sets of numbers below `count` that are linked."""
+    ends = np.array(links, dtype=np.int64).reshape(-1, 2).T
+    graph = sparse.coo_matrix((np.ones(len(links)), (ends[0], ends[1])), shape=(count, count))
+    _, label = csgraph.connected_components(graph, directed=False)
+    order = np.argsort(label, kind="stable")
+    return [each.tolist() for each in np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(each)]
 
 
 def _find_meeting(model: Model, interfaces: Mapping[str, Integer]) -> dict[tuple[str, int], tuple[str, int]]:

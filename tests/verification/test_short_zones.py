@@ -133,3 +133,14 @@ def test_a_short_zone_is_the_same_wherever_curves_begin() -> None:
             least = bound_short_zones(model, order, 0 * slip, slip)
             expected = np.where(slip > 0, PART / 4 * 2.0, 0.0)
             np.testing.assert_allclose(least[:, 1], expected, err_msg=f"{turn}, {len(curves)} curves")
+
+
+def test_many_interfaces_take_what_each_takes_alone() -> None:
+    """Ten thousand zones on cracks that do not meet, as on maps of fractures."""
+    random = np.random.default_rng(5)
+    model, interfaces = make_interfaces({f"crack {k}": (complex(k, 0), k + 0.5 + 0.3j) for k in range(5000)})
+    slip = np.where(random.uniform(size=(5000, 9)) < 0.3, random.uniform(0.5, 1.0, (5000, 9)), 0.0)
+    least = bound_short_zones(model, interfaces, np.zeros(slip.size), slip.ravel()).reshape(5000, 9, 2)
+    for k in range(0, 5000, 500):
+        alone, own = make_interfaces({"crack": (0j, 1 + 0j)})
+        np.testing.assert_array_equal(least[k], bound_short_zones(alone, own, np.zeros(9), slip[k]))

@@ -100,8 +100,7 @@ class Leg:
 
     def divide(self, elements: int, refine_start: bool, refine_end: bool) -> Real:
         """Fractions (elements + 1,) at t^power from every refined end, whatever elements the leg has (theory, 79)."""
-        t = np.arange(elements + 1.0) * (1.0 / elements)  # as np.linspace has them, which takes ten times as long
-        t[-1] = 1.0
+        t = np.linspace(0.0, 1.0, elements + 1)
         if refine_start and refine_end:
             t = np.where(t <= 0.5, 0.5 * (2 * t) ** self.power, 1 - 0.5 * (2 * (1 - t)) ** self.power)
         elif refine_start:

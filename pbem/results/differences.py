@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.geometry.tolerance import TIE
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -28,36 +27,41 @@ def sum_sizes(model: Model, mesh: Mesh, step: Step) -> Real:
     return np.bincount(curve, size, len(model.conditions)).astype(float)
 
 
+# Directions in which nothing bears, but for the rounding of normals.
+NOTHING = 1e-6
+
+
 def bound_reactions(model: Model, mesh: Mesh, step: Step) -> Real:
     """The least errors (c, 2) of the forces along x and y on the outer curves: what all external forces together lack
-    of balance along an axis, shared by the curves whose force along it is not given; zero where that is not known.
+    of balance, shared as by equal springs along the directions in which the forces on the curves are not given; zero
+    where that is not known.
 
     With linear elements slender beams hand on their loads by too little, on meshes of all lengths alike.
     """
     bears = _find_bearing(model, mesh)
     if step.balance is None:
-        return np.zeros(bears.shape)
-    lacking = np.abs(np.nan_to_num(step.balance.whole[:2]))
-    return np.asarray(np.where(bears, lacking / np.maximum(bears.sum(axis=0), 1), 0.0))
+        return np.zeros(bears.shape[:2])
+    lacking = np.nan_to_num(step.balance.whole[:2])
+    return np.asarray(np.abs(bears @ np.linalg.pinv(bears.sum(axis=0), rcond=NOTHING, hermitian=True) @ lacking))
 
 
-def _find_bearing(model: Model, mesh: Mesh) -> Bool:
-    """Whether the force of an outer curve along x or y (c, 2) is not given."""
+def _find_bearing(model: Model, mesh: Mesh) -> Real:
+    """Of outer curves the projections (c, 2, 2) onto the directions in which their forces are not given: their mean
+    along the curve."""
     nodes, curve = _list_outer_nodes(model, mesh)
-    normal, bears = mesh.normal[nodes], np.zeros((len(model.conditions), 2), dtype=bool)
+    normal, bears = mesh.normal[nodes], np.zeros((len(model.conditions), 2, 2))
     for number, condition in enumerate(model.conditions.values()):
         # Springs, or displacements: along the axes, or along the normal and the curve.
-        held = np.array([known == "displacement" or not isinstance(stiffness, float) or stiffness != 0.0
+        held = np.array([float(known == "displacement" or not isinstance(stiffness, float) or stiffness != 0.0)
                          for known, stiffness in zip(condition.known, condition.stiffness, strict=True)])
-        if condition.frame == "local":
-            own = normal[curve == number]
-            across = np.array([np.abs(own.real).max(initial=0.0), np.abs(own.imag).max(initial=0.0)]) > TIE
-            held = (held[0] & across) | (held[1] & across[::-1])
-        bears[number] = held
+        own = normal[curve == number] if condition.frame == "local" else np.ones(1, dtype=complex)
+        axes = np.array([[own.real, own.imag], [-own.imag, own.real]])
+        bears[number] = np.einsum("d,dik,djk->ij", held, axes, axes) / max(len(own), 1)
     names = list(model.conditions)
     for body in model.rigid.values():
         if not body.tool:
-            bears[[names.index(each) for each in body.curves]] = [known == "motion" for known in body.known[:2]]
+            known = [float(each == "motion") for each in body.known[:2]]
+            bears[[names.index(each) for each in body.curves]] = np.diag(known)
     return bears
 
 

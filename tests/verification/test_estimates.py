@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,8 +17,9 @@ import pbem
 from pbem import driver
 from pbem.cli import main
 from pbem.errors import CaseError, ConvergenceError, StopError, StorageError
-from pbem.model.model import Model
+from pbem.model.model import Condition, Model
 from pbem.results import accuracy as limits
+from pbem.results.differences import bound_reactions
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
 from pbem.solve.estimate import second_solution
@@ -516,6 +518,31 @@ def test_what_is_out_of_balance_is_an_error_of_what_bears(local: bool, tmp_path:
     assert 0.5 < error / results.errors.reactions["root 3"][-1, 1] < 2.0
     for name in (*roots[:3], "end", "top"):  # given, or none
         assert results.errors.reactions[name][-1, 1] < 1e-3 * error
+
+
+@pytest.mark.parametrize("degrees", [0.0, 33.0, 71.0, 180.0])
+def test_what_bears_is_the_same_however_a_model_is_turned(degrees: float) -> None:
+    """Two walls with parallel faces, of which one holds along the face as well, and an arch that holds across."""
+    turn = np.exp(1j * np.deg2rad(degrees))
+    normals = turn * np.array([1, 1, -1, -1, *np.exp(1j * np.array([0.4, -0.4]))])
+    mesh: Any = SimpleNamespace(curve_names=("wall", "both", "arch"), node_curve=np.array([0, 0, 1, 1, 2, 2]),
+                                normal=normals)
+    model: Any = SimpleNamespace(rigid={}, conditions={
+        "wall": Condition("wall", "local", ("displacement", "traction")),
+        "both": Condition("both", "local", ("traction", "traction"), (2.0, 1.0))})
+
+    def bound(lacking: complex) -> Any:
+        step: Any = SimpleNamespace(balance=SimpleNamespace(
+            whole=np.array([(turn * lacking).real, (turn * lacking).imag, 0.0])))
+        return bound_reactions(model, mesh, step)
+
+    along, across = (np.abs([(turn * each).real, (turn * each).imag]) for each in (1j, 1 + 0j))
+    np.testing.assert_allclose(bound(4j), [0 * along, 4 * along], atol=1e-12)
+    np.testing.assert_allclose(bound(4 + 0j), [2 * across, 2 * across], atol=1e-12)
+    model.conditions = {"wall": model.conditions["wall"]}  # nothing bears along it
+    np.testing.assert_allclose(bound(4 + 3j), [4 * across], atol=1e-12)
+    model.conditions = {"arch": Condition("arch", "local", ("displacement", "traction"))}
+    np.testing.assert_allclose(bound(4 + 0j), [4 * across], atol=1e-12)
 
 
 def test_a_contact_on_a_small_part_of_its_faces(tmp_path: Path) -> None:

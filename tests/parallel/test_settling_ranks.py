@@ -62,7 +62,7 @@ subdomains.ONE_GROUP, subdomains.CONNECTED_ELEMENTS = 0, 16
 begun = []
 
 def begins(search, counts, state):
-    search._first = state
+    search._note(state)
     search._allowed, allowed = False, search._allowed
     begun.append(allowed)
     return allowed

@@ -208,7 +208,8 @@ def write_blocks(load: str) -> str:
 def solve(text: str, smooths: bool, reporter: SilentReporter | None = None) -> Step:
     """The step of a case whose laws are smoothed after the first iteration, or never."""
     def begins(search: SmoothSearch, counts: list[int], state: PairState) -> bool:
-        search._first, search._allowed, allowed = state, False, search._allowed
+        search._note(state)
+        search._allowed, allowed = False, search._allowed
         return allowed and smooths
 
     with pytest.MonkeyPatch.context() as patch:

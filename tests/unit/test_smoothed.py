@@ -25,8 +25,8 @@ from pbem.solve.nonlinear import newton, smooth_search
 from pbem.solve.nonlinear.newton import solve_step
 from pbem.solve.nonlinear.smooth_search import (
     AIM,
-    AIM_AGAIN,
     CENTRED,
+    EXPECTED,
     FARTHEST,
     FIRST,
     FIRST_ALONE,
@@ -206,7 +206,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     begun: list[int] = []
 
     def begins(search: SmoothSearch, counts: list[int], state: PairState) -> bool:
-        search._first = state
+        search._note(state)
         begun.extend([1] * search._allowed)
         search._allowed, allowed = False, search._allowed
         return allowed
@@ -356,13 +356,26 @@ def test_the_square_of_the_width_falls_by_the_part_of_the_way_that_is_gone() -> 
     np.testing.assert_allclose([width.fall(part) ** 2 for part in (0.0, 0.5, 1.0)], [4.0, 2.2, 0.4], rtol=1e-12)
     # Aimed at again once pairs are near to their laws, at more after a whole way; else they come nearer first.
     near, far = 0.9 * CENTRED, 1.1 * CENTRED
-    assert [width.go_on(part, off).aim for part, off in ((1.0, near), (0.9, near), (1.0, far))] == [AIM_AGAIN, AIM, 1]
-    assert Width(2.0, 4.0, 1e-3).go_on(1.0, near) == Width(2.0, 4.0, 1e-3, AIM)
-    assert Width(2.0, 4.0, 1e-3).go_on(0.3, far) == Width(2.0, 4.0, 1e-3, 1.0)
+    for part in (1.0, 0.3):
+        assert width.go_on(part, far, far).aim == 1 and width.go_on(part, near, 10.0).aim == AIM
+        assert Width(2.0, 4.0, 1e-3).go_on(part, near, 0.1 * near) == Width(2.0, 4.0, 1e-3, AIM)
+        assert Width(2.0, 4.0, 1e-3).go_on(part, far, far) == Width(2.0, 4.0, 1e-3, 1.0)
     # No further than the last one.
-    last = Width(2e-3, 4.0, 1e-3, 0.1).go_on(0.9, near)
+    last = Width(2e-3, 4.0, 1e-3, 0.1).go_on(0.9, near, near)
     assert last.aim == pytest.approx((1e-3 / last.value) ** 2, rel=1e-12) and last.fall(1.0) == pytest.approx(1e-3)
-    assert Width(1e-3, 4.0, 1e-3).go_on(1.0, near) == Width(1e-3, 4.0, 1e-3, 1.0)
+    assert Width(1e-3, 4.0, 1e-3).go_on(1.0, near, near) == Width(1e-3, 4.0, 1e-3, 1.0)
+
+
+@pytest.mark.parametrize("curved", [0.3, 1.0, 3.0])
+def test_the_width_falls_as_far_as_solutions_stay_near_to_their_laws(curved: float) -> None:
+    """Steps that leave K e^2/e_new, as Newton's do: every one leaves as much, and the width falls ever faster."""
+    widths, left = [Width(0.1 / curved, 0.1 / curved, 1e-6, AIM)], []
+    while widths[-1].value > widths[-1].last:
+        now = widths[-1]
+        left.append(curved * now.value**2 / now.fall(1.0))
+        widths.append(now.go_on(1.0, 0.0, left[-1]))
+    np.testing.assert_allclose(left[1:-1], EXPECTED, rtol=1e-6)
+    assert left[-1] <= EXPECTED and len(left) == 4
 
 
 def test_of_the_way_so_much_is_gone_that_pairs_stay_near_to_their_laws(monkeypatch: pytest.MonkeyPatch) -> None:

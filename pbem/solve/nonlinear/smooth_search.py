@@ -54,12 +54,12 @@ SOARED = 2
 # with less, blocks that touch nothing would be held by nothing but rounding. Where no clusters settle by themselves the
 # true laws, by which few pairs are pivoted, do better from a larger one.
 WIDTH, NARROWEST, NARROWEST_ALONE = 0.1, 1e-8, 1e-6
-# The square of the width falls to AIM of itself where pairs are off their smoothed laws by no more than CENTRED of it,
-# in the mean along all pairs, in which none counts for more than FARTHEST widths; to AIM_AGAIN after such a fall that
-# leaves them there, or to AIM_FAR where clusters settle by themselves, if pairs were off by no more than CALM before
-# that. Else an iteration with the same width brings them nearer.
-AIM, AIM_AGAIN, AIM_FAR = 0.1, 0.01, 1e-3
-CENTRED, CALM = 0.15, 0.1
+# The square of the width falls to so much that the next solution should leave pairs off their smoothed laws by EXPECTED
+# of it, in the mean along all pairs, in which none counts for more than FARTHEST widths, and to AIM of itself at least,
+# where they are off by no more than CENTRED. Else an iteration with the same width brings them nearer.
+AIM, EXPECTED, CENTRED = 0.1, 0.2, 0.15
+# A width that is larger than the last one by less than this part of it is the last one.
+ROUNDING = 1e-9
 # Of the way to a solution the largest of these parts is gone that leaves pairs off by no more than NEAR; with the same
 # width, the whole if it leaves BETTER of what they were off, else the part that leaves least.
 PARTS = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05)
@@ -92,15 +92,21 @@ class Width:
 
     def fall(self, part: float) -> float:
         """The width after a part of the way to what is aimed at. (theory, 132)"""
-        return max(self.value * float(np.sqrt(1 - part * (1 - self.aim))), self.last)
+        value = self.value * float(np.sqrt(1 - part + part * self.aim))
+        return self.last if value < self.last * (1 + ROUNDING) else value
 
-    def go_on(self, part: float, off: float, calm: bool = False) -> Width:
+    def go_on(self, part: float, off: float, alone: float) -> Width:
         """The width of the next iteration, after one that went a part of its way and leaves pairs so much off.
 
-        calm: whether they were no further off than CALM before clusters settled by themselves.
+        alone: how much it left them off before clusters settled by themselves. (theory, 138)
         """
         value = self.fall(part)
-        aim = 1.0 if off > CENTRED else AIM if self.aim == 1 or part < 1 else AIM_FAR if calm else AIM_AGAIN
+        if off > CENTRED:
+            aim = 1.0
+        elif self.aim == 1:  # what such a step leaves says nothing of one that aims at less
+            aim = AIM
+        else:
+            aim = min(AIM, (alone / EXPECTED * (value / self.value) ** 2) ** 2)
         return replace(self, value=value, aim=max(aim, (self.last / value) ** 2))
 
 
@@ -131,7 +137,9 @@ class SmoothSearch:
         self._alone = alone
         self._able = bool((self.smooth | laws.bonded | laws.parted | laws.follows).all() and self.smooth.any())
         self._allowed = self._able  # once it has begun no longer
-        self._first: PairState | None = None
+        # The state with the least violation of the true laws so far, that violation, and the first largest traction.
+        self._nearest: PairState | None = None
+        self._violation, self._largest = np.inf, 0.0
         self.taken = 0  # iterations so far
         self.begun = False  # whether `find` is to be asked, or has not ended yet
         self._course: SmoothCourse | None = None
@@ -157,10 +165,10 @@ class SmoothSearch:
     def begins(self, counts: Sequence[int], state: PairState) -> bool:
         """Whether laws are to be smoothed after an iteration, by the numbers of pairs that changed in those so far.
 
-        state: of all pairs in this one; that of the first is where it begins.
+        state: of all pairs in this one; it begins from the one that was nearest to the true laws.
         """
-        if self._first is None:
-            self._first = state
+        if self._allowed:
+            self._note(state)
         many, fewest = counts[-1] > max(MANY * self._problem.laws.count, LEAST), min(counts[:-1], default=np.inf)
         stalls = len(counts) >= (FIRST_ALONE if self._alone else FIRST) and counts[-1] >= SLOWLY * fewest
         soared = not self._alone and counts[-1] > SOARED * fewest
@@ -168,6 +176,15 @@ class SmoothSearch:
             return False
         self._allowed = False
         return True
+
+    def _note(self, state: PairState) -> None:
+        violation, largest = self._problem.decide(lambda: (
+            self._measure(state),
+            float(max(np.abs(state.p_n + self._load.pressure).max(), np.abs(state.p_s).max()))))
+        # Later ones have far larger tractions where a pair holds what nothing else does.
+        self._largest = self._largest or largest
+        if violation < self._violation:
+            self._nearest, self._violation = state, violation
 
     def find(
         self, tangent: TangentOperator, hold: Hold, forcing: Forcing, modes: ModeState, record: Record,
@@ -209,7 +226,7 @@ class SmoothSearch:
             found = take_off_proximal(problem.laws, self.smooth, whole, state, proximal)
             part, off = problem.decide(lambda now=state, new=found, at=width: self._choose_part(now, new, at))  # type: ignore[misc]
             before, state, exact = modes, state.approach(found, part), exact.approach(whole, part)
-            calm = clusters is not None and off <= CALM
+            alone = off
             if clusters is not None:
                 state, off = self._settle_clusters(clusters, state, exact, width.fall(part), off)
                 tangent.expect(stack_states(state))
@@ -221,7 +238,7 @@ class SmoothSearch:
             few = part == 1 and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST)
             if width.fall(part) <= width.last and (few or (clusters is not None and off <= SETTLED)):
                 break
-            width = width.go_on(part, off, calm)
+            width = width.go_on(part, off, alone)
         return modes, state
 
     def _settle_clusters(
@@ -247,13 +264,11 @@ class SmoothSearch:
         return state, problem.decide(lambda: self._measure_off(state, width))
 
     def _start(self, modes: ModeState, alone: bool) -> SmoothCourse:
-        problem, load, first = self._problem, self._load, self._first
-        assert first is not None
-        largest, violation = problem.decide(lambda: (
-            float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
-        last = (NARROWEST_ALONE if alone else NARROWEST) * largest
-        begin = max(WIDTH * violation, last)
-        return SmoothCourse(modes, first, close_smoothed(problem.laws, modes), Width(begin, begin, last))
+        assert self._nearest is not None
+        last = (NARROWEST_ALONE if alone else NARROWEST) * self._largest
+        begin = max(WIDTH * self._violation, last)
+        holding = close_smoothed(self._problem.laws, modes)
+        return SmoothCourse(modes, self._nearest, holding, Width(begin, begin, last))
 
     def _choose_part(self, state: PairState, found: PairState, width: Width) -> tuple[float, float]:
         """The part of the way from a state to a solution that is gone, and by how much pairs are off then."""

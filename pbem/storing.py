@@ -10,7 +10,7 @@ from dataclasses import replace
 from pbem.arrays import Real
 from pbem.clock import clock
 from pbem.errors import ConvergenceError, LawError, PbemError, StopError
-from pbem.heap import give_back
+from pbem.heap import heap
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import Comm, StopSignals, alone, do_on_first, world
@@ -129,7 +129,7 @@ def store_steps(
                     step = replace(step, interior=interior.evaluate(step))
             with clock.piece("estimate"), note_place(step):
                 rows = None if estimator is None else estimator.estimate(step)
-                give_back()  # what the second solution and the comparison took; what is written takes as much again
+                heap.give_back()  # what the second solution and the comparison took: what is written takes as much
             # An error of the first rank is every rank's.
             missing = "" if estimator is None else estimator.missing
             with clock.piece("writing"):

@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 
 from pbem.errors import ResultFileError
-from pbem.heap import give_back
+from pbem.heap import heap
 from pbem.results.free_lists import empty_free_lists
 from pbem.results.growing import GrowingRows
 from pbem.results.journal import JournaledFile, lock
@@ -55,7 +55,7 @@ class Store:
                 try_reading(path)
             self._reopen()
             empty_free_lists()
-            give_back()
+            heap.give_back()
         except BaseException:
             self._journal.close()
             raise

@@ -15,7 +15,7 @@ from pbem.contact.laws import SLIP, Memory, ModeState, commit, find_creeping, fo
 from pbem.contact.loads import Load
 from pbem.contact.modes import linearise, measure_law_error
 from pbem.errors import ConvergenceError
-from pbem.heap import give_back
+from pbem.heap import heap
 from pbem.parallel import StopSignals, do_on_first
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.launch.watch import Watch
@@ -191,4 +191,4 @@ class SecondSolution:
         for name in ("problem", "_whole", "_arranged", "tangent"):
             vars(self).pop(name, None)
         self._ready = False
-        give_back()
+        heap.give_back()

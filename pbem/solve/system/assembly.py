@@ -9,7 +9,7 @@ from pbem.bem.operator import scale_equations
 from pbem.contact.anchor import Anchor, anchor_motions
 from pbem.contact.laws import PairLaws, collect_laws
 from pbem.contact.loads import OuterNodes, collect_outer_nodes
-from pbem.heap import give_back
+from pbem.heap import heap
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import RigidBodyMode
@@ -26,9 +26,9 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     outer, laws = collect_outer_nodes(model, mesh), collect_laws(model, mesh)
     anchored = find_anchored_motions(model)
     anchors = anchor_motions(mesh, anchored)
-    give_back()  # what was read and drawn
+    heap.give_back()  # what was read and drawn
     system = choose_system(model, mesh).assemble(comm, model, mesh, outer, laws, anchors)
-    give_back()
+    heap.give_back()
     return join_problem(comm, model, mesh, outer, laws, system, anchors, anchored)
 
 

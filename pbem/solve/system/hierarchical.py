@@ -29,7 +29,7 @@ from pbem.contact.anchor import Anchor
 from pbem.contact.laws import PairLaws
 from pbem.contact.loads import OuterNodes, find_needed_columns
 from pbem.errors import ConvergenceError
-from pbem.heap import give_back
+from pbem.heap import heap
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
 from pbem.model.model import Model
@@ -143,7 +143,7 @@ class HierarchicalSystem:
     def free_products(self) -> None:
         """See System: the rows; what interior points and cracks need of the operator stays."""
         self.operator.near.clear()
-        give_back()
+        heap.give_back()
 
     def recover(self, v: Real) -> Real:
         """See System (theory, 13)."""

@@ -14,7 +14,7 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
-from pbem.heap import give_back
+from pbem.heap import heap
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.petsc.minimal_residual import MinimalResidual
 from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence
@@ -153,7 +153,7 @@ class KrylovTangent(TangentOperator):
         """Take a constraint map; the directions of GMRES are dropped where they are those of another operator."""
         if self.product.take_map(constraints):
             self._space.forget()
-            give_back()
+            heap.give_back()
 
     def _begin(self, load: Load, begin: Real | None, loosely: bool) -> _Iterate:
         """The first iterate, from this rank's part of unknowns that are nearly the solution.

@@ -25,7 +25,7 @@ from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plas
 from pbem.contact.loads import Load
 from pbem.contact.local_laws import solve_laws
 from pbem.contact.modes import Linearisation, linearise
-from pbem.heap import give_back
+from pbem.heap import heap
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
 from pbem.parallel import add_up
@@ -105,7 +105,7 @@ class Sweeps:
             formed = preconditioner.form_block(near, around, mesh.pairs.slave[each])
             formed = self.parts.soften(each) @ formed.reshape(len(each), 2, -1)
             stiffness.append(-formed.reshape(2 * len(each), -1).astype(np.float32))
-        give_back()
+        heap.give_back()
 
     def settle(
         self, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved, judge: Judge

@@ -31,7 +31,7 @@ def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie | Pai
     closed = np.flatnonzero((modes.mode != OPEN) & ~pairs.crack)
     closed = closed[np.argsort(pairs.interface[closed], kind="stable")]
     bounds = np.searchsorted(pairs.interface[closed], np.arange(len(names) + 1))
-    extent = _measure_span(mesh, np.arange(pairs.count))
+    extent = mesh.keep("extents of interfaces", lambda mesh: _measure_span(mesh, np.arange(mesh.pairs.count)))
     held = _measure_span(mesh, closed[modes.mode[closed] == STICK]) > APART * extent
     ties: dict[str, Tie | PairTie] = {}
     for number, name in enumerate(names):

@@ -346,12 +346,15 @@ def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Re
 
     (theory, 55)
     """
+    intact = laws.brittle & ~memory.broken
+    if not intact.any():
+        return np.zeros(laws.count, dtype=bool)
     limit = tensile_limit(laws, memory) - pressure
     strength = evaluate_strength(
         laws, np.minimum(state.p_n, limit), memory.look_ahead(np.zeros(laws.count)), pressure
     )
     overload = np.maximum(state.p_n + pressure - laws.tensile_strength, np.abs(state.p_s) - strength.bound)
-    overload = np.where(laws.brittle & ~memory.broken, overload, 0.0)[laws.leader]
+    overload = np.where(intact, overload, 0.0)[laws.leader]
     worst = overload.max(initial=0.0)
     if worst <= ROUNDING * max(_largest_traction(state), floor):
         return np.zeros(laws.count, dtype=bool)

@@ -41,12 +41,11 @@ def read_dilation(laws: PairLaws, internal: Mapping[str, NDArray[Any]]) -> Real:
 
 def evaluate_dilation(laws: PairLaws, p_n: Real, slide: Slide, pressure: Real) -> Dilation:
     """What the slip ahead adds to the dilation of all pairs (m,), and its derivatives."""
-    effective = find_effective(laws, p_n, pressure)
     result = Dilation(np.zeros(laws.count), np.zeros(laws.count), np.zeros(laws.count))
     for group in laws.strengths:
         at = group.pairs
         if group.law.dilates and len(at):
-            part = group.law.dilate(effective[at], slide.take(at), group.parameters)
+            part = group.law.dilate(find_effective(laws, p_n, pressure)[at], slide.take(at), group.parameters)
             result.opening[at], result.by_traction[at], result.by_slip[at] = (
                 part.opening, part.by_traction, part.by_slip
             )  # fmt: skip

@@ -61,6 +61,8 @@ def stick_bonded(laws: PairLaws, memory: Memory, modes: ModeState, state: PairSt
 
     memory: of the beginning of a step; state: in which further bonds may be lost.
     """
+    if not any(group.law.bonds for group in laws.strengths):
+        return modes
     if state is not None:  # bonds do not ask for the fluid pressure
         memory = commit(laws, memory, modes, state, np.zeros(laws.count))
     holds = find_bonded(laws, memory) & (modes.mode == OPEN)
@@ -75,11 +77,11 @@ def begin_jump(laws: PairLaws, memory: Memory) -> Real:
 def choose_jump(laws: PairLaws, modes: ModeState, memory: Memory, state: PairState, pressure: Real) -> Real:
     """Jumps (m, 2) at which the laws are taken next: those of the last solution, in the modes that led to it, and of
     bonded pairs those that belong to their trial values (theory, 107)."""
-    jump = _find_jump(laws, modes, state)
+    jump = _find_jumps(laws, modes, state)
     for bonds in list_bonds(laws, memory):
-        relative = bonds.choose_stiffness(laws)
-        trial = _find_trial(bonds, relative, jump, state, pressure)
-        jump[bonds.pairs] = bonds.law.find_jump(trial, relative, bonds.start, bonds.parameters)
+        relative, at = bonds.choose_stiffness(laws), bonds.pairs
+        trial = _find_trial(bonds, relative, jump[at], state, pressure)
+        jump[at] = bonds.law.find_jump(trial, relative, bonds.start, bonds.parameters)
     return jump
 
 
@@ -136,9 +138,9 @@ def judge_bonds(
 ) -> Parting:
     """Which bonded pairs open: in tension, where the bond has given way or does so (theory, 107)."""
     live, opens, violation = np.zeros(laws.count, dtype=bool), np.zeros(laws.count, dtype=bool), np.zeros(laws.count)
-    jump = _find_jump(laws, modes, state)
     for bonds in list_bonds(laws, memory):
         at, was = bonds.pairs, modes.mode[bonds.pairs] == OPEN
+        jump = _find_jumps(laws, modes, state)[at]
         trial = _find_trial(bonds, bonds.choose_stiffness(laws), jump, state, pressure)
         strength = bonds.parameters["tensile_strength"]
         pull = trial[:, 0] * strength
@@ -152,24 +154,25 @@ def judge_bonds(
 
 def measure_bond_error(laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real) -> float:
     """The largest distance of open bonded pairs from their law (stress), by the trial stiffness where jumps differ."""
-    jump, worst = _find_jump(laws, modes, state), 0.0
+    worst = 0.0
     for bonds in list_bonds(laws, memory):
-        relative = bonds.choose_stiffness(laws)
+        relative, jump = bonds.choose_stiffness(laws), _find_jumps(laws, modes, state)[bonds.pairs]
         trial = _find_trial(bonds, relative, jump, state, pressure)
-        away = jump[bonds.pairs] - bonds.law.find_jump(trial, relative, bonds.start, bonds.parameters)
+        away = jump - bonds.law.find_jump(trial, relative, bonds.start, bonds.parameters)
         stiffness = np.stack([bonds.parameters["tensile_strength"], bonds.parameters["cohesion"]], axis=1)
         error = relative[:, None] * stiffness * np.abs(away) / bonds.law.find_units(bonds.parameters)
         worst = max(worst, float(error[modes.mode[bonds.pairs] == OPEN].max(initial=0.0)))
     return worst
 
 
-def _find_jump(laws: PairLaws, modes: ModeState, state: PairState) -> Real:
+def _find_jumps(laws: PairLaws, modes: ModeState, state: PairState) -> Real:
     """Jumps (m, 2) less what elastic joints take; closed pairs have no opening."""
     opening = np.where(modes.mode == OPEN, state.g_n - laws.compliance_n * state.p_n, 0.0)
     return np.stack([opening, plastic_slip(laws, state)], axis=1)
 
 
 def _find_trial(bonds: Bonds, relative: Real, jump: Real, state: PairState, pressure: Real) -> Real:
+    """Trial values (k, 2) of bonds with jumps (k, 2)."""
     at = bonds.pairs
     traction = np.stack([state.p_n[at] + pressure[at], state.p_s[at]], axis=1)
-    return bonds.law.find_trial(traction, jump[at], relative, bonds.parameters)
+    return bonds.law.find_trial(traction, jump, relative, bonds.parameters)

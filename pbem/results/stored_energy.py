@@ -17,7 +17,7 @@ from pbem.bem.point_field import find_shift
 from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.at_rest import bear_in_situ
 from pbem.contact.laws import collect_laws
-from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load, evaluate_walls
+from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_pressure, evaluate_walls
 from pbem.mesh.mesh import Faces, Mesh, list_faces
 from pbem.model.model import Model
 from pbem.results.dissipation import PairRecord, measure_stored, record_pairs, record_pairs_at_rest
@@ -25,7 +25,7 @@ from pbem.results.face_weights import weigh_faces
 from pbem.results.point_work import evaluate_unit_motions, measure_point_forces, measure_point_motions
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import Step
-from pbem.uniform import repeat_value
+from pbem.uniform import fold_uniform, repeat_value
 
 UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Faces whose work is summed up at a time.
@@ -190,7 +190,7 @@ class StoredEnergy:
         return self._compose(self._in_situ, nothing, 0, 0.0, self._pairs_at_rest)
 
     def describe(self, step: Step) -> EnergyState:
-        pressure = evaluate_load(self._model, self._mesh, self.outer, step.stage, step.factor).pressure
+        pressure = fold_uniform(evaluate_pressure(self._model, self._mesh, step.stage, step.factor))
         pairs = record_pairs(self.laws, step.contact, pressure)
         return self._compose(step.traction, step.displacement, step.stage, step.factor, pairs)
 

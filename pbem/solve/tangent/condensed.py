@@ -142,7 +142,7 @@ class CondensedTangent(TangentOperator):
         if known is None or not np.array_equal(known.laws[self.fixed], law.tangent[self.fixed]):
             return False
         changed = np.flatnonzero((self._split(law).b_tangent != 0).any(axis=(1, 2)))
-        missing = np.setdiff1d(changed, known.columns.known)
+        missing = changed[~self._mark(known.columns.known)[changed]]
         # From one step to the next most often no tangent changes: the factors of their system serve again.
         tangents = law.tangent[self.varying]
         size = 0 if known.counted is not None and np.array_equal(known.counted, tangents) else 2 * len(changed)
@@ -151,6 +151,12 @@ class CondensedTangent(TangentOperator):
         self._add_columns(missing, size)
         self.known = replace(self._present, counted=tangents)
         return True
+
+    def _mark(self, pairs: Integer) -> Bool:
+        """Which ones (v,) of the varying pairs are among these."""
+        there = np.zeros(len(self.varying), dtype=bool)
+        there[pairs] = True
+        return there
 
     def _add_columns(self, missing: Integer, size: int) -> None:
         """Take further pairs' columns; size: of the dense system that they are wanted for."""
@@ -221,7 +227,6 @@ class CondensedTangent(TangentOperator):
         # B m, of which the load's part is known.
         own = apply_narrow(self.reference.operator, constraints.offset - solution.offset)
         scale = problem.measure(solution.forces + own) or 1.0
-        split = self._split(law).drop_offsets()
         best: Solved | None = None
         for _ in range(1 + MOST_CORRECTIONS):
             v = constraints.evaluate(unknowns)
@@ -233,6 +238,7 @@ class CondensedTangent(TangentOperator):
             best = Solved(unknowns, residual)
             if left_over <= GOOD_RESIDUAL * scale or not np.isfinite(residual):
                 break
+            split = self._split(law).drop_offsets()
             unknowns = unknowns + self._condense(self._solve_system(-left[:, None]), split)[0][:, 0]
         assert best is not None
         return best
@@ -248,7 +254,7 @@ class CondensedTangent(TangentOperator):
         """x (2 nodes, c) for c columns y, and the solution of the known pairs' system, by the first rank."""
         problem, columns = self.problem, self._present.columns
         known = columns.known
-        rest = np.setdiff1d(np.arange(len(self.varying)), known)
+        rest = np.flatnonzero(~self._mark(known))
         if split.b_offset[rest].any():
             constant = np.zeros_like(split.b_offset)
             constant[rest] = split.b_offset[rest]

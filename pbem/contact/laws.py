@@ -268,15 +268,20 @@ def evaluate_strength(laws: PairLaws, p_n: Real, slide: Slide, pressure: Real) -
     effective = find_effective(laws, p_n, pressure)
     result = Strength(np.zeros(laws.count), np.zeros(laws.count), np.zeros(laws.count))
     for group in laws.strengths:
-        at, own = group.pairs, slide.take(group.pairs)
+        at = group.pairs
         if not len(at):  # of a contact without pairs; laws of one's own are not asked about none
             continue
-        parameters = dict(group.parameters)
-        if "cohesion" in parameters:
-            parameters["cohesion"] = np.where(own.broken, 0.0, parameters["cohesion"])
-        part = group.law.strength(effective[at], own, **parameters)
+        part = ask_law(group.law, effective[at], slide.take(at), group.parameters)
         result.bound[at], result.by_traction[at], result.by_slip[at] = part.bound, part.by_traction, part.by_slip
     return result
+
+
+def ask_law(law: FrictionLaw, p_n: Real, slide: Slide, parameters: Mapping[str, Real]) -> Strength:
+    """What it answers for pairs (k,), of which brittle ones that are broken have no cohesion; p_n: effective."""
+    asked = dict(parameters)
+    if "cohesion" in asked:
+        asked["cohesion"] = np.where(slide.broken, 0.0, asked["cohesion"])
+    return law.strength(p_n, slide, **asked)
 
 
 def tensile_limit(laws: PairLaws, memory: Memory) -> Real:

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Bool, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.closure import find_closure, measure_stiffening
 from pbem.contact.declaration import BROKEN, SLIP_PATH, Passage, Slide, take_values
-from pbem.contact.laws import (
-    OPEN,
-    SLIP,
-    PairLaws,
-    StrengthGroup,
-    evaluate_strength,
-    find_effective,
-    start_memory,
-)
+from pbem.contact.laws import OPEN, SLIP, PairLaws, StrengthGroup, ask_law, find_effective, start_memory
 from pbem.solve.problem.step import ContactState
 from pbem.uniform import fold_uniform
 
@@ -127,8 +119,10 @@ def measure_work(
     falling = np.maximum(0.5 * (np.where(closed, old.p_s, 0.0) + new.p_s) * slipped, 0.0)
     by_law = falling.copy()
     for group in laws.strengths:
-        if group.law.integrates and not group.law.bonds and slides[group.pairs].any():
-            by_law[group.pairs] = _integrate_bound(laws, group, old, new, slipped)
+        own = np.flatnonzero(slides[group.pairs])
+        for begin in range(0, len(own), INTEGRATED) if group.law.integrates and not group.law.bonds else ():
+            chosen = own[begin:begin + INTEGRATED]
+            by_law[group.pairs[chosen]] = _integrate_bound(laws, group, chosen, old, new, slipped)
     dissipated = np.where(slides & ~lost, by_law, falling) + torn
     friction = np.where(slides, by_law, np.where(lost, 0.0, falling))
     for group in laws.strengths:
@@ -170,30 +164,35 @@ def _describe_passage(laws: PairLaws, group: StrengthGroup, old: PairRecord, new
     )  # fmt: skip
 
 
-# Gauss points and weights on (0, 1).
-POINTS, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(8)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(8)[1])
+# Gauss points and weights on (0, 1), in columns.
+POINTS, WEIGHTS = (each[:, None] for each in (0.5 * (np.polynomial.legendre.leggauss(8)[0] + 1),
+                                              0.5 * np.polynomial.legendre.leggauss(8)[1]))
+# Pairs whose bound is evaluated at a time, at all points at once.
+INTEGRATED = 256
 
 
 def _integrate_bound(
-    laws: PairLaws, group: StrengthGroup, old: PairRecord, new: PairRecord, slipped: Real
+    laws: PairLaws, group: StrengthGroup, chosen: Integer, old: PairRecord, new: PairRecord, slipped: Real
 ) -> Real:
-    """Integral (k,) of the friction bound of a group's pairs over the slip of the step, with normal traction and fluid
-    pressure linear in the slip; pairs whose bonds are lost have lost them from the beginning.
+    """Integral (k,) of the friction bound of chosen ones of a group's pairs over the slip of the step, with normal
+    traction and fluid pressure linear in the slip; pairs whose bonds are lost have lost them from the beginning.
 
     By Gauss points on two pieces that meet where the bound has a kink: exact for linear weakening.
     """
-    own, length = group.pairs, np.abs(slipped)
-    cut = np.full(laws.count, 0.5)
-    cut[own] = group.law.find_kink(old.internal[SLIP_PATH.name][own], length[own], group.parameters)
-    strength = np.where(new.broken, 0.0, laws.tensile_strength)
-    start = {**old.internal, BROKEN.name: new.broken}
-    alone = replace(laws, strengths=(group,))
-    total = np.zeros(laws.count)
-    for begin, size in ((np.zeros(laws.count), cut), (cut, 1 - cut)):
-        for point, weight in zip(POINTS, WEIGHTS, strict=True):
-            at = begin + size * point
-            pressure = old.pressure + at * (new.pressure - old.pressure)
-            p_n = np.minimum(old.p_n + at * (new.p_n - old.p_n), strength - pressure)
-            bound = evaluate_strength(alone, p_n, Slide(at * length, start), pressure).bound
-            total += weight * size * length * bound
-    return total[own]
+    own, parameters = group.pairs[chosen], {name: values[chosen] for name, values in group.parameters.items()}
+    length, lost = np.abs(slipped[own]), new.broken[own]
+    cut = group.law.find_kink(old.internal[SLIP_PATH.name][own], length, parameters)
+    at = np.concatenate([cut * POINTS, cut + (1 - cut) * POINTS])
+    part = np.concatenate([WEIGHTS * cut, WEIGHTS * (1 - cut)])
+    pressure = old.pressure[own] + at * (new.pressure - old.pressure)[own]
+    limit = np.where(lost, 0.0, laws.tensile_strength[own]) - pressure
+    p_n = np.minimum(old.p_n[own] + at * (new.p_n - old.p_n)[own], limit)
+    effective = p_n + np.where(laws.fluid_inside[own], pressure, 0.0)
+    start = {**take_values(old.internal, own), BROKEN.name: lost}
+
+    def repeat(values: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        return {name: np.tile(each, len(at)) for name, each in values.items()}
+
+    slide = Slide((at * length).ravel(), repeat(start))
+    bound = ask_law(group.law, effective.ravel(), slide, repeat(parameters)).bound
+    return np.asarray((part * length * bound.reshape(at.shape)).sum(axis=0))

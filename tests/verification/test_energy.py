@@ -29,6 +29,7 @@ from pbem.model.model import (
     SolverOptions,
     Stage,
 )
+from pbem.results import dissipation
 from pbem.results.describe import describe_results
 from pbem.results.dissipation import PairRecord, PairWork, measure_work
 from pbem.results.energy import Energy, EnergyBalance
@@ -293,6 +294,14 @@ def test_more_steps_change_little() -> None:
         add_energies(stack_blocks(shear_and_back(steps), Law("coulomb", 1.0), (6, 10), 3.0))[-1] for steps in (5, 40)
     )
     np.testing.assert_allclose(few.dissipated, many.dissipated, rtol=0.02)
+
+
+def test_a_law_is_asked_for_its_bound_some_pairs_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = stack_blocks(shear_and_back(2), Law("coulomb", 1.0), (4, 6), 3.0)
+    together = add_energies(model)
+    monkeypatch.setattr(dissipation, "INTEGRATED", 3)
+    assert together[-1].dissipated > 0.1 * together[-1].external
+    assert add_energies(model) == together
 
 
 def test_weights_of_tip_elements_integrate_the_root() -> None:

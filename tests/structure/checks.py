@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -63,13 +63,14 @@ MOST_LINES = 400
 
 @dataclass(frozen=True)
 class Module:
-    """A source file. name: dotted, e.g. "pbem.mesh.mesh"; is_package: it is an __init__.py."""
+    """A source file. name: dotted, e.g. "pbem.mesh.mesh"; is_package: it is an __init__.py; nodes: of its tree."""
 
     name: str
     path: Path
     is_package: bool
     text: str = field(repr=False)
     tree: ast.Module = field(repr=False)
+    nodes: tuple[ast.AST, ...] = field(repr=False)
 
     @property
     def part(self) -> str:
@@ -85,13 +86,14 @@ def read_modules(package: Path) -> dict[str, Module]:
         is_package = parts[-1] == "__init__"
         name = ".".join(parts[:-1] if is_package else parts)
         text = path.read_text(encoding="utf-8")
-        modules[name] = Module(name, path, is_package, text, ast.parse(text, str(path)))
+        tree = ast.parse(text, str(path))
+        modules[name] = Module(name, path, is_package, text, tree, tuple(ast.walk(tree)))
     return modules
 
 
 def list_imports(module: Module) -> Iterator[tuple[int, str]]:
     """Yield line and absolute dotted name of all that is imported, also inside functions and for types only."""
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name
@@ -157,7 +159,7 @@ def check_doors(module: Module) -> list[str]:
 def check_questions(module: Module) -> list[str]:
     """No module asks which system of equations or tangent operator it has before it, and only makers know them."""
     faults = []
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         match node:
             case ast.Call(func=ast.Name(id="isinstance" | "issubclass"), args=[_, kind]):
                 asked = {name.id for name in ast.walk(kind) if isinstance(name, ast.Name)}
@@ -184,12 +186,12 @@ def check_names(module: Module) -> list[str]:
     """No name that means several things, no module, class or function whose name says nothing."""
     faults = [
         f"{module.path}:{line}: the name {FORBIDDEN_NAME!r} means several things"
-        for line, name in list_names(module.tree)
+        for line, name in list_names(module.nodes)
         if name == FORBIDDEN_NAME
     ]
     definitions = [(1, module.name)] + [
         (node.lineno, node.name)
-        for node in ast.walk(module.tree)
+        for node in module.nodes
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
     ]
     faults += [
@@ -200,9 +202,9 @@ def check_names(module: Module) -> list[str]:
     return faults
 
 
-def list_names(tree: ast.Module) -> Iterator[tuple[int, str]]:
+def list_names(nodes: Iterable[ast.AST]) -> Iterator[tuple[int, str]]:
     """Yield line and name wherever a source gives or uses one."""
-    for node in ast.walk(tree):
+    for node in nodes:
         match node:
             case ast.Name(id=name) | ast.arg(arg=name) | ast.Attribute(attr=name) | ast.keyword(arg=str(name)):
                 yield node.lineno, name

@@ -40,7 +40,7 @@ def find_questions(module: Module) -> Iterator[int]:
     or hand it to a function, but for those that carry it on; or ask whether a `center` is there.
     """
     counters = {
-        node.target.id for node in ast.walk(module.tree)
+        node.target.id for node in module.nodes
         if isinstance(node, ast.For | ast.comprehension) and isinstance(node.target, ast.Name)
         and isinstance(node.iter, ast.Call) and getattr(node.iter.func, "id", None) == "range"
     }
@@ -52,7 +52,7 @@ def find_questions(module: Module) -> Iterator[int]:
             return node.attr == name
         return isinstance(node, ast.Name) and node.id == name and name not in counters
 
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         if isinstance(node, ast.Call):
             function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
             owner = [node.func.value] if isinstance(node.func, ast.Attribute) else []

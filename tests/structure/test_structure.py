@@ -14,86 +14,73 @@ import pbem
 from tests.structure import checks, kinds
 from tests.structure.checks import Module
 
-MODULES = checks.read_modules(Path(pbem.__file__).parent)
-each_module = pytest.mark.parametrize("module", MODULES.values(), ids=MODULES.keys())
-
 # Whoever only reads cases and results waits for no MPI, and needs none.
 WITH_MPI = ("parallel", "solve", "pass_file", "storing", "driver", "sweeps", "__main__")
-WITHOUT_MPI = [name for name, module in MODULES.items() if module.part not in WITH_MPI]
 
 
-def expect_none(faults: list[str]) -> None:
-    """Fail with all the faults, a line each."""
+@pytest.fixture(scope="module")
+def modules() -> dict[str, Module]:
+    """The sources of the package, which are read where they are looked at: every process collects this file."""
+    return checks.read_modules(Path(pbem.__file__).parent)
+
+
+def check_order(modules: dict[str, Module]) -> list[str]:
+    """Imports go along the order of the parts, in all modules."""
+    return [fault for module in modules.values() for fault in checks.check_order(module, modules)]
+
+
+def of_each(check: Callable[[Module], list[str]]) -> Check:
+    """The check of a single module as one of all of them."""
+    return lambda modules: [fault for module in modules.values() for fault in check(module)]
+
+
+Check = Callable[[dict[str, Module]], list[str]]
+CHECKS: dict[str, Check] = {
+    "imports go along the path of the data": check_order,
+    "no cycle of imports": checks.check_cycles,
+    "libraries come in by their own part": of_each(checks.check_doors),
+    "nobody asks which system of equations it is": of_each(checks.check_questions),
+    "names say one thing": of_each(checks.check_names),
+    "docstrings are there": of_each(checks.check_docstrings),
+    "modules are short": of_each(checks.check_length),
+    "only the protocol asks for an element's kind": of_each(kinds.check_kinds),
+}
+
+
+def test_all_parts_are_read(modules: dict[str, Module]) -> None:
+    # Else the tests below could pass because they look at nothing.
+    assert {"pbem", "pbem.errors", "pbem.model.model", "pbem.mesh.mesh", "pbem.solve.problem.step"} <= modules.keys()
+
+
+@pytest.mark.parametrize("check", CHECKS.values(), ids=CHECKS.keys())
+def test_the_package_obeys(check: Check, modules: dict[str, Module]) -> None:
+    faults = check(modules)
     assert not faults, "\n".join(faults)
 
 
-def test_all_parts_are_read() -> None:
-    # Else the tests below could pass because they look at nothing.
-    assert {"pbem", "pbem.errors", "pbem.model.model", "pbem.mesh.mesh", "pbem.solve.problem.step"} <= MODULES.keys()
-
-
-@each_module
-def test_imports_go_along_the_path_of_the_data(module: Module) -> None:
-    expect_none(checks.check_order(module, MODULES))
-
-
-def test_no_cycle_of_imports() -> None:
-    expect_none(checks.check_cycles(MODULES))
-
-
-@each_module
-def test_libraries_come_in_by_their_own_part(module: Module) -> None:
-    expect_none(checks.check_doors(module))
-
-
-@each_module
-def test_nobody_asks_which_system_of_equations_it_is(module: Module) -> None:
-    expect_none(checks.check_questions(module))
-
-
-def test_the_kinds_of_systems_are_there() -> None:
-    defined = {
-        node.name for module in MODULES.values() for node in ast.walk(module.tree) if isinstance(node, ast.ClassDef)
-    }
+def test_the_kinds_of_systems_are_there(modules: dict[str, Module]) -> None:
+    defined = {node.name for module in modules.values() for node in module.nodes if isinstance(node, ast.ClassDef)}
     assert set(checks.KINDS) | checks.MAKERS.keys() <= defined
-    assert {maker for makers in checks.MAKERS.values() for maker in makers} <= MODULES.keys()
+    assert {maker for makers in checks.MAKERS.values() for maker in makers} <= modules.keys()
 
 
-@each_module
-def test_names_say_one_thing(module: Module) -> None:
-    expect_none(checks.check_names(module))
-
-
-@each_module
-def test_docstrings_are_there(module: Module) -> None:
-    expect_none(checks.check_docstrings(module))
-
-
-@each_module
-def test_modules_are_short(module: Module) -> None:
-    expect_none(checks.check_length(module))
-
-
-@each_module
-def test_only_the_protocol_asks_for_an_elements_kind(module: Module) -> None:
-    expect_none(kinds.check_kinds(module))
-
-
-def test_who_may_ask_for_a_kind_is_there_and_few() -> None:
+def test_who_may_ask_for_a_kind_is_there_and_few(modules: dict[str, Module]) -> None:
     # 36 modules did before there was a protocol.
-    assert MODULES.keys() >= kinds.MAY_ASK and len(kinds.MAY_ASK) <= 8
+    assert modules.keys() >= kinds.MAY_ASK and len(kinds.MAY_ASK) <= 8
 
 
 # A model is made by calls as well as from a file: up to the mechanics nothing knows of files or processes.
 KNOW_NO_FILES = ("geometry", "description", "model", "mesh", "bem", "contact")
-WITHOUT_FILES = [name for name, module in MODULES.items() if module.part in KNOW_NO_FILES]
 
 
-@pytest.mark.parametrize(("names", "banned"), [
-    (WITHOUT_MPI, ("mpi4py", "petsc4py")),
-    (WITHOUT_FILES, ("mpi4py", "petsc4py", "h5py", "tomllib", "pbem.case")),
+@pytest.mark.parametrize(("asked", "banned"), [
+    (lambda part: part not in WITH_MPI, ("mpi4py", "petsc4py")),
+    (lambda part: part in KNOW_NO_FILES, ("mpi4py", "petsc4py", "h5py", "tomllib", "pbem.case")),
 ], ids=["no MPI", "no files"])  # fmt: skip
-def test_what_is_loaded_on_the_way(names: list[str], banned: tuple[str, ...]) -> None:
+def test_what_is_loaded_on_the_way(
+    asked: Callable[[str], bool], banned: tuple[str, ...], modules: dict[str, Module]
+) -> None:
+    names = [name for name, module in modules.items() if asked(module.part)]
     code = f"""
 import importlib, sys
 for name in sys.argv[1:]:
@@ -134,18 +121,7 @@ SOUND = {
 
 def list_faults(modules: dict[str, Module]) -> list[str]:
     """Apply all checks to all modules."""
-    each: list[Callable[[Module], list[str]]] = [
-        lambda module: checks.check_order(module, modules),
-        checks.check_doors,
-        checks.check_questions,
-        checks.check_names,
-        checks.check_docstrings,
-        checks.check_length,
-        kinds.check_kinds,
-    ]
-    return [fault for module in modules.values() for check in each for fault in check(module)] + checks.check_cycles(
-        modules
-    )
+    return [fault for check in CHECKS.values() for fault in check(modules)]
 
 
 def test_a_sound_tree_has_no_fault(tmp_path: Path) -> None:

@@ -1,14 +1,24 @@
-"""What all tests share: starting the program on several ranks, and leaving out errors that nobody looks at."""
+"""What all tests share: collecting them, starting the program on several ranks, leaving out errors that nobody sees."""
 
 from __future__ import annotations
 
+import gc
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
 from tests.parallel.launch import launch, launch_snippet
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Collected tests stay to the end: the collector of cycles would go through them again and again."""
+    gc.disable()
+    yield
+    gc.enable()
+    gc.freeze()
 
 
 @pytest.fixture

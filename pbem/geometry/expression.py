@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +27,8 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[Real, Real], Real]] = {
 }
 # Characters that users may write; what the program composes from several texts may be longer.
 LONGEST = 2000
+# Expressions whose trees are kept: a run evaluates a few of them thousands of times, and reading costs more than that.
+_KEPT = 256
 _UNREADABLE = ("a text that cannot be read", 'an expression such as "0.1*sin(2*pi*t)"')
 
 
@@ -62,12 +65,13 @@ def read_expression(text: str, **variables: ArrayLike) -> Real:
     return evaluate_expression(text, **variables)
 
 
-def list_names(text: str) -> set[str]:
+@lru_cache(_KEPT)
+def list_names(text: str) -> frozenset[str]:
     """The names that an expression has anywhere, those of functions included; none of a text that is no expression."""
     try:
-        return {node.id for node in ast.walk(_parse(text)) if isinstance(node, ast.Name)}
+        return frozenset(node.id for node in ast.walk(_parse(text)) if isinstance(node, ast.Name))
     except ExpressionError:
-        return set()
+        return frozenset()
 
 
 def list_switches(text: str) -> list[str]:
@@ -106,7 +110,9 @@ def _find_degree(node: ast.expr, names: tuple[str, ...]) -> float:
     return 0
 
 
+@lru_cache(_KEPT)
 def _parse(text: str) -> ast.expr:
+    """The tree, which nobody changes. Raises ExpressionError."""
     if "\0" in text:  # Python 3.13 tells it otherwise than 3.11
         raise ExpressionError(*_UNREADABLE)
     try:

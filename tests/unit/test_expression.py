@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 
 import numpy as np
@@ -13,6 +14,7 @@ from pbem.geometry.expression import (
     FUNCTIONS_OF_TWO,
     ExpressionError,
     evaluate_expression,
+    list_names,
     read_expression,
 )
 
@@ -122,3 +124,12 @@ def test_nesting_without_end_is_an_error() -> None:
     for text in (500 * "(" + "1" + 500 * ")", 1900 * "-" + "1", "1" + 990 * "+1"):
         with pytest.raises(ExpressionError, match=r"cannot be read|breaks off"):
             evaluate_expression(text)
+
+
+def test_an_expression_is_read_once_however_often_it_is_evaluated(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts, parse = [], ast.parse
+    with monkeypatch.context() as patch:
+        patch.setattr(ast, "parse", lambda text, **named: texts.append(text) or parse(text, **named))
+        found = [float(evaluate_expression("t + 0.1234567", t=time)) for time in (0.0, 1.0, 2.0)]
+    assert found == [0.1234567, 1.1234567, 2.1234567] and list_names("t + 0.1234567") == {"t"}
+    assert texts == ["t + 0.1234567"]

@@ -138,31 +138,32 @@ def choose_force_divisor(square: Real, shares: Real | None, smooth: float) -> fl
 def list_force_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
     """Which part of the square of the difference is error (e,), on the elements of the run's mesh, whose model is
     `model`; None where nothing tells of corners. At them it falls by r^FORCE_RATE where the second solution's elements
-    are r times as long. smooth: what it is divided by elsewhere.
+    are r times as long, and with twice that power of the number of nodes of an element. smooth: what it is divided by
+    elsewhere.
     """
     return _list_shares(model, beside, smooth, math.inf)
 
 
 def list_factor_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
     """The same for factors, of which only ends of cracks on interfaces with a softer material tell; None without."""
-    if all(end.power >= WEAK for end in list_corner_ends(model)):
+    if beside.kind == "order" or all(end.power >= WEAK for end in list_corner_ends(model)):
         return None
     return _list_shares(model, beside, smooth, WEAK)
 
 
 def _list_shares(model: Model, beside: Beside, smooth: float, below: float) -> Real | None:
     """below: corners with this power or more are as anything else."""
-    if beside.kind != "merged":
-        return None
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
     by = np.full(beside.fine.elements, 1 / smooth)
+    lowered = (beside.fine.order + 1) / (beside.mesh.order + 1)
     for name, own in list_curve_elements(beside.model, beside.mesh):
         for element, ratio, power in at_corner.get(name, ()):
             if power < below or math.isinf(below):
                 at = fine[own[element]]
                 rate = 2 * power if power < WEAK else FORCE_RATE
-                by[at] = np.maximum(by[at], 1 / (ratio**rate - 1))
+                more = lowered ** (2 * rate) if beside.kind == "order" else ratio**rate
+                by[at] = np.maximum(by[at], 1 / (more - 1))
     return np.asarray(by)
 
 

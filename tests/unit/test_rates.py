@@ -96,7 +96,7 @@ def test_differences_of_jumps_are_divided_by_what_the_place_is(plate: Model) -> 
 def test_ends_on_a_softer_material_alone_are_weak(plate: Model) -> None:
     # Where a crack turns differences are divided by less than 1, too, but jumps need not vanish.
     assert choose_jump_divisors(plate, put(plate), SMOOTH).min() < 1 and not find_weak_ends(plate, put(plate)).any()
-    beyond = """beyond = { points = [[4, -4], [8, -4], [8, 4], [4, 4]], elements = 4, grading = "none" }
+    beyond = """beyond = { points = [[4, -4], [8, -4], [8, 4], [4, 4]], elements = 6, grading = "none" }
 [regions.soft]
 material = "clay"
 boundary = ["right", "upper", "beyond"]
@@ -134,8 +134,21 @@ def test_differences_of_forces_are_divided_by_where_they_come_from(plate: Model)
     square[between] = 0.0
     assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(corner)
     assert choose_force_divisor(np.zeros_like(square), shares, SMOOTH) == SMOOTH
-    assert list_force_shares(plate, replace(beside, kind="lowered"), SMOOTH) is None
     assert choose_force_divisor(np.ones_like(square), None, SMOOTH) == SMOOTH
+
+
+def test_differences_at_corners_to_a_lower_order_are_divided_by_less(plate: Model) -> None:
+    side = replace(plate.curves["left"].legs[0], elements=1)
+    single = replace(plate, curves=plate.curves | {"left": Curve("left", (side,))})
+    beside = put_beside(single, generate_mesh(single))
+    assert beside is not None and beside.kind == "order"
+    square, shares = np.zeros(beside.fine.elements), list_force_shares(single, beside, SMOOTH)
+    square[take_element(single, beside.fine, "left", 0)] = 2.0
+    # Three nodes in place of two; at corners the error falls with twice the power of their number.
+    assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(1.5 ** (2 * FORCE_RATE) - 1)
+    square[:] = 0.0
+    square[take_element(single, beside.fine, "leg", 3)] = 2.0
+    assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(SMOOTH)
 
 
 def take_element(model: Model, mesh: Mesh, name: str, number: int) -> int:

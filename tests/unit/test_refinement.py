@@ -61,6 +61,18 @@ def test_elements_are_merged_in_pairs(plate: Model) -> None:
                    zip(coarse.model.curves[name].legs, ends, strict=True))  # fmt: skip
 
 
+@pytest.mark.parametrize(("order", "sides", "kind"), [
+    (2, ("left",), "order"), (3, ("left",), "order"), (1, ("left",), "merged"), (2, (), "merged"),
+])  # fmt: skip
+def test_beside_sides_with_a_single_element_the_order_is_lowered(
+    plate: Model, order: int, sides: tuple[str, ...], kind: str
+) -> None:
+    single = {name: Curve(name, tuple(replace(leg, elements=1) for leg in plate.curves[name].legs)) for name in sides}
+    model = replace(plate, curves=plate.curves | single, analysis=replace(plate.analysis, order=order))
+    coarse = coarsen_model(model)
+    assert coarse is not None and coarse.kind == kind
+
+
 def test_arcs_that_would_turn_too_far_are_kept(plate: Model) -> None:
     leg = plate.curves["round"].legs[0]
     curves = plate.curves | {"round": Curve("round", (replace(leg, elements=5, fractions=None),))}

@@ -578,3 +578,21 @@ def test_a_contact_on_a_small_part_of_its_faces(tmp_path: Path) -> None:
     error = math.sqrt(np.trapz(square, where) / (where[-1] - where[0]))
     assert 0.1 < error / results.errors.traction_n["seat"][-1] < 10
     assert 1e-5 < results.errors.relative["jumps"][-1] < 1e-3
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_sides_with_a_single_element_are_not_left_out(order: int, tmp_path: Path) -> None:
+    """A polygon two of whose sides have one element, beside others of eight: estimates were 70 times too small."""
+    corners = [[2.6, 1.1], [-0.9, 2.4], [-2.9, 1.7], [-3.6, -1.6], [1.3, -2.1]]
+    curves = {f"side {k}": {"points": [corners[k], corners[(k + 1) % 5]], "elements": 1 if k in (0, 2) else 8}
+              for k in range(5)}
+    results = pbem.run({
+        "materials": {"rock": {"young": 2e3, "poisson": 0.3}}, "curves": curves,
+        "regions": {"body": {"material": "rock", "boundary": list(curves)}},
+        "boundary": {"side 0": {"ux": 0.0, "uy": 0.0}, "side 1": {"us": 0.0}, "side 3": {"tn": -1.0}},
+        "analysis": {"steps": 1, "order": order},
+    }, tmp_path / "polygon.h5")
+    # Of order 3 with sixteen elements on each side, to 2e-5.
+    right = {"side 0": [1.55868734, -4.17945981], "side 1": [-2.05868698, -0.72054044]}
+    error = max(np.abs(results.reactions[name][-1] - force).max() for name, force in right.items())
+    assert 1.0 < error / np.linalg.norm(right["side 0"]) / results.errors.relative["reactions"][-1] < 6.0

@@ -34,7 +34,8 @@ MERGED = (1.0, 3.0, 5.0, 5.0)
 LOWERED = 5.0
 # Of the largest displacement: jumps and factors below are rounding, and have no relative error.
 ROUNDING = 1e-8
-# Of the modulus times the largest displacement over the model's size: no traction is known better.
+# Of the modulus times the largest displacement over the model's size: no traction is known better. Nor is the modulus
+# times a displacement over the size known better than this part of the largest traction.
 DIGITS = 1e-13
 # Differences of K pass through zero by chance; of the relative error of a crack's jumps this part at least is K's.
 LEAST_FACTOR_ERROR = 0.005
@@ -326,6 +327,8 @@ class Comparison:
     def _relate(self, estimates: Estimates) -> Relative:
         scales, size = self.scales, self._model.size
         moved, rounding = scales.displacement, ROUNDING * scales.strained
+        # Under in-situ stress nothing but rounding may have moved yet.
+        borne = max(scales.peak, scales.reactions / size) * size / self._modulus.min(initial=np.inf)
         return Relative(
             reactions=_divide(_worst(estimates.reactions), scales.reactions, rounding * size),
             jumps=_divide(max(_worst(estimates.opening), _worst(estimates.slip), key=_nan_first), scales.jumps,
@@ -335,7 +338,7 @@ class Comparison:
             factors=_divide(max(_worst_known(estimates.KI, self._rules.is_tip),
                                 _worst_known(estimates.KII, self._rules.is_tip), key=_nan_first),
                             scales.factors, rounding * np.sqrt(size)),
-            displacement=_divide(estimates.displacement, moved, 0.0),
+            displacement=_divide(estimates.displacement, moved, DIGITS * borne),
         )  # fmt: skip
 
 

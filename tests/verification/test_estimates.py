@@ -455,6 +455,21 @@ def make_creeping_joint(length: float, stress: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def test_displacements_of_rounding_have_no_relative_error(tmp_path: Path) -> None:
+    """Nothing moves under the in-situ stress alone: no mesh would bring the error of that below the accuracy."""
+    results = pbem.run({
+        "materials": {"rock": {"young": 1e4, "poisson": 0.2}},
+        "curves": {"wall": {"center": [0.515, 1.545], "radius": 1.0, "elements": 12}},
+        "regions": {"rock": {"material": "rock", "boundary": ["wall"], "infinite": True},
+                    "core": {"material": "rock", "boundary": ["wall"]}},
+        "initial_stress": {"rock": {"sxx": -4.0, "syy": -7.0, "sxy": 1.0}},
+        "analysis": {"steps": 1, "accuracy": 1e-2},
+    }, tmp_path / "core.h5")
+    assert 0 < np.abs(results.displacement).max() < 1e-16  # some rounding there is
+    assert results.errors.relative["displacement"][-1] == 0.0
+    assert len(results.nodes.position) == 72
+
+
 def test_errors_of_creeping_faces_are_those_of_laws_that_hold_or_none(tmp_path: Path) -> None:
     """In any units: what differs from a state that is off from its laws by half of the tractions is no error."""
     one, other = (pbem.run(make_creeping_joint(length, stress), tmp_path / f"{length}.h5")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
@@ -22,8 +22,9 @@ Fractions = Mapping[str, tuple[tuple[float, ...], ...]]
 COARSE = 0.8
 # Errors on interfaces that stay as they are would not be seen: of their elements at most this part.
 KEPT = 0.05
-# Nor would those on sides with a single element, beside which others are merged: of the length of all outer curves
-# they have at most this part. On polygons that have some such sides errors were up to 300 times the estimated ones.
+# Nor would those on legs with a single element, beside which others are merged: of the length of all outer curves, or
+# of all interfaces, they have at most this part. On polygons with some such sides errors were up to 300 times the
+# estimated ones, beside interfaces that turn with such legs 80 times.
 SINGLE = 0.1
 # Of elements that meet the longer is at most so many times as long, where elements are halved.
 WIDEST_RATIO = 2.0
@@ -50,25 +51,27 @@ def coarsen_model(model: Model) -> CoarseModel | None:
     """The model with neighbouring elements of each leg merged in pairs; None if there is nothing to make coarser.
 
     Where an arc would turn too far, or a crack with two tips would have one element, elements are kept. Where that
-    leaves too many of them, or whole interfaces, or long sides that have a single element (at orders 2 and 3: constant
-    elements may not hold what one linear element holds), the order is lowered instead.
+    leaves too many of them, or whole interfaces, or long legs that have a single element (of outer curves at orders 2
+    and 3: constant elements may not hold what one linear element holds), the order is lowered instead.
     """
     curves = {name: _merge_pairs(curve, _least_elements(model, name)) for name, curve in model.curves.items()}
     before, after = (sum(count_elements(curve) for curve in each.values()) for each in (model.curves, curves))
     faces = {*model.interfaces, *(name for each in model.contacts.values() for name in (each.first, each.second))}
     numbers = {name: count_elements(model.curves[name]) for name in faces}
     kept = sum(number for name, number in numbers.items() if count_elements(curves[name]) == number)
-    unseen = model.analysis.order > 1 and _measure_single(model) > SINGLE
-    if after <= COARSE * before and kept <= KEPT * sum(numbers.values()) and not unseen:
+    single = _measure_single(model, faces)
+    if model.analysis.order > 1:
+        single = max(single, _measure_single(model, model.conditions))
+    if after <= COARSE * before and kept <= KEPT * sum(numbers.values()) and single <= SINGLE:
         return CoarseModel(replace(model, curves=curves), "merged")
     if model.analysis.order == 0:
         return None
     return CoarseModel(replace(model, analysis=replace(model.analysis, order=model.analysis.order - 1)), "order")
 
 
-def _measure_single(model: Model) -> float:
-    """The part of the length of all outer curves that is on legs with a single element."""
-    legs = [leg for name in model.conditions for leg in model.curves[name].legs]
+def _measure_single(model: Model, names: Iterable[str]) -> float:
+    """The part of the length of some curves that is on legs with a single element."""
+    legs = [leg for name in names for leg in model.curves[name].legs]
     single = sum(leg.length for leg in legs if leg.elements == 1)
     return float(single / max(sum(leg.length for leg in legs), np.finfo(float).tiny))
 

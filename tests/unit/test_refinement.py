@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -70,6 +71,17 @@ def test_beside_sides_with_a_single_element_the_order_is_lowered(
     single = {name: Curve(name, tuple(replace(leg, elements=1) for leg in plate.curves[name].legs)) for name in sides}
     model = replace(plate, curves=plate.curves | single, analysis=replace(plate.analysis, order=order))
     coarse = coarsen_model(model)
+    assert coarse is not None and coarse.kind == kind
+
+
+@pytest.mark.parametrize(("order", "elements", "kind"), [(1, 1, "order"), (2, 1, "order"), (2, 2, "merged")])
+def test_beside_legs_of_cracks_with_a_single_element_the_order_is_lowered(
+    plate: Model, order: int, elements: int, kind: str
+) -> None:
+    points, numbers = (0.5 + 0.5j, 0.8 + 0.55j, 1.2 + 0.5j, 1.5 + 0.7j), (6, elements, 6)
+    legs = tuple(Leg(*ends, number) for ends, number in zip(pairwise(points), numbers, strict=True))
+    model = replace(plate, curves=plate.curves | {"crack": Curve("crack", legs)})
+    coarse = coarsen_model(replace(model, analysis=replace(model.analysis, order=order)))
     assert coarse is not None and coarse.kind == kind
 
 

@@ -611,3 +611,16 @@ def test_sides_with_a_single_element_are_not_left_out(order: int, tmp_path: Path
     right = {"side 0": [1.55868734, -4.17945981], "side 1": [-2.05868698, -0.72054044]}
     error = max(np.abs(results.reactions[name][-1] - force).max() for name, force in right.items())
     assert 1.0 < error / np.linalg.norm(right["side 0"]) / results.errors.relative["reactions"][-1] < 6.0
+
+
+def test_legs_of_cracks_with_a_single_element_are_not_left_out(tmp_path: Path) -> None:
+    results = pbem.run({
+        "materials": {"rock": {"young": 2e3, "poisson": 0.3}},
+        "curves": {"crack": {"points": [[0, 0], [1, 0.1], [2.1, -0.05], [3, 0.15], [4, 0]], "elements": [6, 1, 6, 1]}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}},
+        "remote": {"syy": 1.0, "sxy": 0.3}, "analysis": {"steps": 1},
+    }, tmp_path / "crack.h5")
+    tips = results.tips["crack"]
+    # Of order 3 with twenty elements and more on each leg, to 1e-5.
+    error = max(np.abs(tips.KI[-1] - [2.374448, 2.632812]).max(), np.abs(tips.KII[-1] - [0.982906, 0.398418]).max())
+    assert 1.0 < error / 2.632812 / results.errors.relative["factors"][-1] < 6.0  # 16 without them

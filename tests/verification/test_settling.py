@@ -220,10 +220,12 @@ def test_cohesion_without_admissible_modes_is_named_and_the_advice_works() -> No
 
 
 def test_cohesion_without_admissible_modes_at_small_loads_is_not_halved_towards() -> None:
-    """Loads far below the cohesion: faces part or stick, the same at every fraction, of which the least is tried."""
-    listener = Listener()
+    """Loads far below the cohesion: faces part or stick, the same at every fraction, of which the least is tried. Bonds
+    that are lost for good hold in the end."""
+    listener, bond = Listener(), 'law = "coulomb", cohesion = 9.0, tensile_strength = 9.0, cohesion_lost = true'
+    text = write_cohesive_field(False).replace("min_step = 0.6, ", "") + f"[interfaces]\ncrack_9 = {{ {bond} }}\n"
     with pytest.raises(ConvergenceError, match=r"the step to 0\.0001 failed and is the smallest allowed") as caught:
-        run(write_cohesive_field(False).replace("min_step = 0.6, ", ""), listener)
+        run(text, listener)
     assert caught.value.reason == "no admissible modes"
     assert listener.tried == 3 and len(listener.rejected) == 2
 

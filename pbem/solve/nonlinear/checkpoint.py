@@ -45,6 +45,7 @@ GIVEN = {
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
     "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape", "_along", "_alone", "_able"),
     "blocks": ("_problem", "_smooth", "_own", "_stiffness"),
+    "torn": ("_losing",),
 }
 
 

@@ -41,6 +41,7 @@ from pbem.solve.nonlinear.search import (
     list_searches,
 )
 from pbem.solve.nonlinear.smooth_search import CLOSELIEST, SmoothSearch
+from pbem.solve.nonlinear.torn import TornPairs
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Iteration, Supervisor
 from pbem.solve.problem.tangent import Solved, TangentOperator
@@ -125,7 +126,7 @@ def _search_modes(
     parts = {
         "hold": Hold(problem, memory, load), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
         "smoothing": smoothing, "running": RunningGroup(problem, tangent),
-        "blocks": OpenBlocks(problem, smoothing.smooth),
+        "blocks": OpenBlocks(problem, smoothing.smooth), "torn": TornPairs(problem),
     }
     checkpoint = Checkpoint(tangent, load, iterations, parts)
     course = checkpoint.resume(resumed) if resumed else None
@@ -155,12 +156,13 @@ class _Run:
         refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
         checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
         fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup, blocks: OpenBlocks,
+        torn: TornPairs,
     ) -> None:
         """See _search_modes; course: with which it begins, None at its first iteration."""
         self.problem, self.laws, self.tangent, self.load, self.reporter = problem, problem.laws, tangent, load, reporter
         self.refuse, self.hurried, self.iterations, self.checkpoint = refuse, hurried, iterations, checkpoint
         self.hold, self.search, self.forcing, self.fixed_point = hold, search, forcing, fixed_point
-        self.smoothing, self.running, self.blocks = smoothing, running, blocks
+        self.smoothing, self.running, self.blocks, self.torn = smoothing, running, blocks, torn
         self.clusters = smoothing.make_cluster_search()
         course = course or begin_course(hold, len(iterations) // PATIENCE)
         self.modes, self.normal_traction, self.slip, self.jump = (
@@ -309,7 +311,8 @@ class _Run:
         search.note(outcome.proposal, outcome.law_error)
         self.blocks.move_on(outcome.pairs, outcome.driven, outcome.settled)
         self.running.note(search, outcome.proposal, outcome.law_error)
-        if end := search.find_end(self.most, self.hurried):
+        self.torn.note(search, self.modes)
+        if end := search.find_end(self.most, self.hurried, self.torn.are_all_that_is_left(search)):
             raise end_search(self.hold, end, self.modes, outcome.proposal, search)
         if left:
             self.modes, self.normal_traction, self.slip, self.jump = self.kept

@@ -218,12 +218,16 @@ class Search:
         """Whether the search has found no equilibrium, and the bodies do not come to rest either."""
         return bool(self.collapse) and len(self.counts) >= LATEST
 
-    def find_end(self, most: int, hurried: bool) -> str | None:
+    def find_end(self, most: int, hurried: bool, torn: bool = False) -> str | None:
         """The reason for which the search ends after this iteration; None if it goes on.
 
         most: iterations that the user grants; hurried: whether a search is given up before where it leads nowhere, by
-        pairs that go on changing each other.
+        pairs that go on changing each other; torn: see pbem.solve.nonlinear.torn, which tells more than groups that
+        were pivoted.
         """
+        if torn:
+            self.failed = None
+            return "no admissible modes"
         if self.taken >= most or self.collapses():  # what moves on has a reason of its own (see end_search)
             return "iteration limit"
         return "mode cycle" if hurried and self.is_stuck() else None

@@ -21,12 +21,13 @@ def is_proportional_at_last(problem: Problem, memory: Memory, stage: int, reache
     """Whether states of this step come to be proportional to its load, the smaller that is, and are not trivial there.
 
     So it is as above with cohesion besides, which no traction reaches in the end: faces without tensile strength then
-    either part or stick, and where no choice of these is admissible no smaller step finds one.
+    either part or stick, and where no choice of these is admissible no smaller step finds one. Bonds with tensile
+    strength hold in the end; those without are lost where they part, and what friction then does knows no stress.
     """
     laws = problem.laws
     parts = ~(laws.bonded | laws.parted) & ~(laws.tensile_strength > 0)
     plain = all(group.law.linear for group in laws.strengths if parts[group.pairs].any())
-    if laws.gap[parts].any() or not parts.any() or not plain or laws.brittle.any():
+    if laws.gap[parts].any() or not parts.any() or not plain:
         return False
     return _grows_from_rest(problem, memory, stage, reached)
 

@@ -98,7 +98,7 @@ class Width:
     def go_on(self, part: float, off: float, alone: float) -> Width:
         """The width of the next iteration, after one that went a part of its way and leaves pairs so much off.
 
-        alone: how much it left them off before clusters settled by themselves. (theory, 138)
+        alone: how much it left them off before clusters settled by themselves. (theory, 132)
         """
         value = self.fall(part)
         if off > CENTRED:

@@ -344,7 +344,7 @@ def test_a_step_aims_at_the_laws_of_a_narrower_width_to_the_first_order(aim: flo
         nearest = np.stack([law.tangent[k] @ np.linalg.lstsq(law.tangent[k], off[k], rcond=None)[0]
                             for k in range(COUNT)])
         aimed = PairState(*(nearest + law.offset).T)
-        width = Width(WIDTH, WIDTH, 1e-9, part).fall(1.0)
+        width = Width(WIDTH, 1e-9, part).fall(1.0)
         left.append(measure_violation(laws, everywhere, aimed, memory, pressure, width).max())
         before = measure_violation(laws, everywhere, state, memory, pressure, width).max()
         assert left[-1] < 0.1 * before or aim == 1
@@ -352,24 +352,24 @@ def test_a_step_aims_at_the_laws_of_a_narrower_width_to_the_first_order(aim: flo
 
 
 def test_the_square_of_the_width_falls_by_the_part_of_the_way_that_is_gone() -> None:
-    width = Width(2.0, 4.0, 1e-3, 0.1)
+    width = Width(2.0, 1e-3, 0.1)
     np.testing.assert_allclose([width.fall(part) ** 2 for part in (0.0, 0.5, 1.0)], [4.0, 2.2, 0.4], rtol=1e-12)
     # Aimed at again once pairs are near to their laws, at more after a whole way; else they come nearer first.
     near, far = 0.9 * CENTRED, 1.1 * CENTRED
     for part in (1.0, 0.3):
         assert width.go_on(part, far, far).aim == 1 and width.go_on(part, near, 10.0).aim == AIM
-        assert Width(2.0, 4.0, 1e-3).go_on(part, near, 0.1 * near) == Width(2.0, 4.0, 1e-3, AIM)
-        assert Width(2.0, 4.0, 1e-3).go_on(part, far, far) == Width(2.0, 4.0, 1e-3, 1.0)
+        assert Width(2.0, 1e-3).go_on(part, near, 0.1 * near) == Width(2.0, 1e-3, AIM)
+        assert Width(2.0, 1e-3).go_on(part, far, far) == Width(2.0, 1e-3, 1.0)
     # No further than the last one.
-    last = Width(2e-3, 4.0, 1e-3, 0.1).go_on(0.9, near, near)
+    last = Width(2e-3, 1e-3, 0.1).go_on(0.9, near, near)
     assert last.aim == pytest.approx((1e-3 / last.value) ** 2, rel=1e-12) and last.fall(1.0) == pytest.approx(1e-3)
-    assert Width(1e-3, 4.0, 1e-3).go_on(1.0, near, near) == Width(1e-3, 4.0, 1e-3, 1.0)
+    assert Width(1e-3, 1e-3).go_on(1.0, near, near) == Width(1e-3, 1e-3, 1.0)
 
 
 @pytest.mark.parametrize("curved", [0.3, 1.0, 3.0])
 def test_the_width_falls_as_far_as_solutions_stay_near_to_their_laws(curved: float) -> None:
     """Steps that leave K e^2/e_new, as Newton's do: every one leaves as much, and the width falls ever faster."""
-    widths, left = [Width(0.1 / curved, 0.1 / curved, 1e-6, AIM)], []
+    widths, left = [Width(0.1 / curved, 1e-6, AIM)], []
     while widths[-1].value > widths[-1].last:
         now = widths[-1]
         left.append(curved * now.value**2 / now.fall(1.0))
@@ -386,7 +386,7 @@ def test_of_the_way_so_much_is_gone_that_pairs_stay_near_to_their_laws(monkeypat
 
     def choose(off: Any, aim: float) -> tuple[float, float]:
         monkeypatch.setattr(SmoothSearch, "_measure_off", lambda at, state, width: off(state.p_n[0], width))
-        return search._choose_part(here, there, Width(1.0, 1.0, 1e-3, aim))
+        return search._choose_part(here, there, Width(1.0, 1e-3, aim))
 
     assert choose(lambda part, width: 0.99 * NEAR, AIM) == (1.0, 0.99 * NEAR)
     assert choose(lambda part, width: NEAR * part / 0.75, AIM)[0] == 0.7

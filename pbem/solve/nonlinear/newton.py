@@ -40,7 +40,7 @@ from pbem.solve.nonlinear.search import (
     go_on_warily,
     list_searches,
 )
-from pbem.solve.nonlinear.smooth_search import CLOSELIEST, SmoothSearch
+from pbem.solve.nonlinear.smooth_search import CLOSELY, SmoothSearch
 from pbem.solve.nonlinear.torn import TornPairs
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Iteration, Supervisor
@@ -231,7 +231,7 @@ class _Run:
         constraints = self.hold.release(problem.constrain(law, load), self.modes)
         part = forcing.choose(search.level > 0, search.counts[-1] / max(self.laws.count, 1) if search.counts else 1.0)
         try:
-            solved = self.tangent.solve(constraints, load, law, min(part, CLOSELIEST) if search.smoothed else part)
+            solved = self.tangent.solve(constraints, load, law, min(part, CLOSELY) if search.smoothed else part)
             loosely = solved.loosely
             forcing.used |= loosely
             search.plain = PLAIN_FROM_SMOOTHED if search.smoothed else PLAIN_IF_LOOSE if loosely else PLAIN

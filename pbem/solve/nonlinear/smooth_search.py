@@ -74,19 +74,16 @@ MOST_WIDENED = 1e3
 LONGEST, FEW, FEWEST = 40, 1e-2, 10
 # Or one with the last width after which pairs are off by no more than this once clusters have settled.
 SETTLED = 0.01
-# The part of the residual that is left, as blocks that are nearly free move by far more than it tells: for the first
-# width, for narrower ones less, by the root of how much narrower they are, ...
-CLOSELY = 1e-3
-# ... and in the iterations with the true laws that follow.
-CLOSELIEST = 1e-6
+# The part of the residual that is left, as blocks that are nearly free move by far more than it tells, and later ones,
+# in which they are freer, do not move them back; and in the iterations with the true laws that follow.
+CLOSELY = 1e-6
 
 
 @dataclass(frozen=True)
 class Width:
-    """A width (stress), the first one and the last one, and the part of its square that the next iteration aims at."""
+    """A width (stress), the last one, and the part of its square that the next iteration aims at."""
 
     value: float
-    first: float
     last: float
     aim: float = 1.0
 
@@ -214,9 +211,8 @@ class SmoothSearch:
                 width.value * self._shape, proximal, width.aim,
             )
             constraints = hold.release(problem.constrain(law, load), holding)
-            closely = max(CLOSELY * np.sqrt(width.value / width.first), CLOSELIEST)
             try:
-                solved = tangent.solve(constraints, load, law, min(forcing.choose(False), closely))
+                solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))
             except ConvergenceError:
                 if not taken:
                     raise
@@ -268,7 +264,7 @@ class SmoothSearch:
         last = (NARROWEST_ALONE if alone else NARROWEST) * self._largest
         begin = max(WIDTH * self._violation, last)
         holding = close_smoothed(self._problem.laws, modes)
-        return SmoothCourse(modes, self._nearest, holding, Width(begin, begin, last))
+        return SmoothCourse(modes, self._nearest, holding, Width(begin, last))
 
     def _choose_part(self, state: PairState, found: PairState, width: Width) -> tuple[float, float]:
         """The part of the way from a state to a solution that is gone, and by how much pairs are off then."""

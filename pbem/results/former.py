@@ -16,17 +16,16 @@ from pbem.solve.problem.step import Former, Step
 GROUP = "former"
 
 
-def write_former(file: h5py.File, before: Step | None, step: Step, pairs: Integer) -> None:
+def write_former(file: h5py.File, before: Step | None, step: Step, pairs: Integer, stored: int = 0) -> None:
     """Keep what is known of loads beyond a step that is stored, and what is needed of the step before it, unless that
     was stored as well or of another stage.
 
-    pairs: in the order of `join_pairs`.
+    pairs: in the order of `join_pairs`; stored: the number of the last step that was stored.
     """
-    number = file["steps/number"]
     if step.ahead:
         group = file.require_group(GROUP)
         group.attrs["ahead"] = json.dumps({"number": step.number, **step.ahead})
-    if before is None or before.stage != step.stage or (len(number) and int(number[-1]) == before.number):
+    if before is None or before.stage != step.stage or before.number == stored:
         return
     group = file.require_group(GROUP)
     group.attrs.update({"number": before.number, "factor": before.factor})

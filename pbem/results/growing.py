@@ -32,16 +32,28 @@ class GrowingRows:
 
         Raises KeyError if there is no such dataset, ValueError for a row of another shape.
         """
-        rows = self._opened.get(path)
-        if rows is None:
-            rows = self._opened[path] = _Rows(self._file, path)
-        rows.append(row)
+        self._open(path).append(row)
+
+    def extend(self, path: str, entries: NDArray[Any]) -> None:
+        """Add entries (n,) with names for their columns, of which those are taken that the dataset has: files of
+        earlier versions that are gone on with have fewer."""
+        rows = self._open(path)
+        values = np.empty(len(entries), dtype=rows.kind)
+        for name in rows.kind.names:
+            values[name] = entries[name]
+        rows.extend(values)
 
     def list_names(self, group: str) -> tuple[str, ...]:
         """Names of what a group holds, which stay the same; none if there is no such group."""
         if group not in self._names:
             self._names[group] = tuple(self._file[group]) if group in self._file else ()
         return self._names[group]
+
+    def _open(self, path: str) -> _Rows:
+        rows = self._opened.get(path)
+        if rows is None:
+            rows = self._opened[path] = _Rows(self._file, path)
+        return rows
 
 
 class _Rows:
@@ -52,34 +64,20 @@ class _Rows:
         access.set_chunk_cache(PLACES, CACHED, 1.0)
         self._own = h5d.open(file.id, path.encode(), access)
         self._count, *rest = self._own.shape
-        self._row, self._kind, self._type = tuple(rest), self._own.dtype, self._own.get_type()
+        self._row, self.kind, self._type = tuple(rest), self._own.dtype, self._own.get_type()
         self._entry = h5s.create_simple((1, *rest))
         self._first = (0,) * len(rest)
-        self._empty = 0 in self._row
 
     def append(self, row: ArrayLike) -> None:
-        values = np.empty((1, *self._row), dtype=self._kind)
+        values = np.empty((1, *self._row), dtype=self.kind)
         values[0] = row
-        self._own.set_extent((self._count + 1, *self._row))
-        if not self._empty:
+        self.extend(values)
+
+    def extend(self, values: NDArray[Any]) -> None:
+        self._own.set_extent((self._count + len(values), *self._row))
+        if values.size:
             place = self._own.get_space()
             place.select_hyperslab((self._count, *self._first), values.shape)
-            self._own.write(self._entry, place, values, self._type)
-        self._count += 1
-
-
-def extend(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
-    """Add entries (n, ...) along the first axis. Raises ValueError for those of another shape.
-
-    As `dataset.resize` and `dataset[count:] = rows` do, of whose time HDF5 takes a third: the rest goes to what else a
-    dataset offers, and to all that may stand in the brackets.
-    """
-    own = dataset.id
-    count, *others = own.shape
-    if rows.shape[1:] != tuple(others):
-        raise ValueError(f"found entries of the shape {rows.shape[1:]}; expected {tuple(others)}")
-    own.set_extent((count + len(rows), *others))
-    if rows.size:
-        place = own.get_space()
-        place.select_hyperslab((count, *(0 for _ in others)), rows.shape)
-        own.write(h5s.create_simple(rows.shape), place, np.ascontiguousarray(rows))
+            entries = self._entry if len(values) == 1 else h5s.create_simple(values.shape)
+            self._own.write(entries, place, values, self._type)
+        self._count += len(values)

@@ -17,7 +17,6 @@ from pbem.results.absent import fill
 from pbem.results.configuration import find_change, find_other_elements
 from pbem.results.energy import Energy
 from pbem.results.former import read_ahead
-from pbem.results.growing import extend
 from pbem.results.layout import (
     ENERGIES,
     MAY_FOLLOW,
@@ -124,7 +123,7 @@ def read_last_energy(file: h5py.File) -> Energy:
     group = file["energy"]
     for kind in ("released", "removed"):
         if kind not in group:  # a file of an earlier version
-            extend(create_energy(group, kind), np.zeros(len(group["external"])))
+            create_energy(group, kind).resize(len(group["external"]), axis=0)  # with zeros
     return Energy(**{kind: float(group[kind][k - 1]) for kind in ENERGIES})
 
 

@@ -11,7 +11,6 @@ from types import MappingProxyType, TracebackType
 
 import h5py
 import numpy as np
-from numpy.lib.recfunctions import repack_fields
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.contact.custom import find_fault
@@ -23,7 +22,6 @@ from pbem.results.balance import append_balance
 from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.former import read_former, write_former
-from pbem.results.growing import extend
 from pbem.results.hoop_stress import HoopStress
 from pbem.results.layout import (
     ENERGIES,
@@ -164,6 +162,7 @@ class ResultWriter:
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
         self._hoop_stress = HoopStress(model, mesh)
         self._absence = Absence(model, mesh, points)
+        self._last_stored = 0 if last_step is None else last_step.number
         self._pending: Reached | None = None  # is to be stored if the run ends with it
         self._tried: Reached | None = None  # is being appended
         self.appended = 0  # steps that are in the file for good
@@ -186,9 +185,7 @@ class ResultWriter:
         drop_unfinished(self._file)
         before, self._latest = self._latest, step
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
-        table = self._file["convergence"]
-        # Files of earlier versions that are resumed have fewer columns.
-        extend(table, repack_fields(np.array(rows, dtype=ITERATION)[list(table.dtype.names)]))
+        self._storage.rows.extend("convergence", np.array(rows, dtype=ITERATION))
         self._tried = reached = Reached(step, before, self._balance.add(step), estimates or {})
         fault = find_fault(group.law for group in self._balance.laws.strengths)
         if fault:
@@ -222,14 +219,18 @@ class ResultWriter:
         """Forget what was written since the last commit."""
         self._storage.roll_back()
         self._noted.clear()
+        self._last_stored = self._find_numbers()[1]
 
     def _find_last(self) -> Reached | None:
         """The step that the file ends with, if it has its iterations alone: after a commit that failed that is the
         step before, or the step itself where it failed when all was on the disk."""
-        last, stored = (int(each[-1]) if len(each) else 0
-                        for each in (self._file["convergence"]["step"], self._file["steps/number"]))
-        either = (self._pending, self._tried)
-        return next((each for each in either if each and stored < each.step.number == last), None)
+        last, stored = self._find_numbers()
+        return next((each for each in (self._pending, self._tried) if each and stored < each.step.number == last), None)
+
+    def _find_numbers(self) -> list[int]:
+        """Numbers of the last step that has its iterations in the file, and of the last one stored; 0 for none."""
+        return [int(each[-1]) if len(each) else 0
+                for each in (self._file["convergence"]["step"], self._file["steps/number"])]
 
     def complete(self, interior: InteriorValues) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""
@@ -238,7 +239,7 @@ class ResultWriter:
 
     def _store(self, reached: Reached) -> None:
         file, rows, step = self._file, self._storage.rows, reached.step
-        write_former(file, reached.before, step, self._pairs)
+        write_former(file, reached.before, step, self._pairs, self._last_stored)
         hoop_stress, reactions = self._hoop_stress.evaluate(step), self._sum_reactions(step.traction)
         tips = self.tip_rules.evaluate_all(step) if self.tip_rules.cracks else {}
         gone = self._absence.list_faces(step.stage)
@@ -278,6 +279,7 @@ class ResultWriter:
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
             rows.append(f"steps/{quantity}", value)
+        self._last_stored = step.number
 
     def note_missing(self, reason: str) -> None:
         """Say in the file why errors are not estimated."""

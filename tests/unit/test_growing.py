@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from pbem.results.growing import GrowingRows, extend
+from pbem.results.growing import GrowingRows
 
 COLUMNS = np.dtype([("number", "i4"), ("residual", "f8")])
 
@@ -33,17 +33,22 @@ def test_entries_are_those_of_h5py(tmp_path: Path, shape: tuple[int, ...], kind:
             other.resize(len(other) + 1, axis=0)
             other[-1] = row
         assert mine.shape == (len(rows), *shape) and mine[()].tobytes() == other[()].tobytes()
-        extend(mine, mine[:2])
-        assert mine[()].tobytes() == np.concatenate([other[()], other[:2]]).tobytes()
-        extend(mine, mine[:0])
-        assert len(mine) == len(rows) + 2
+
+
+def test_entries_are_added_by_the_names_of_their_columns(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "grown.h5", "w") as file:
+        table = file.create_dataset("table", (0,), COLUMNS, maxshape=(None,), chunks=(2,))
+        growing = GrowingRows(file)
+        entries = np.array([(0.5, 7, 1), (0.25, 8, 2), (0.125, 9, 3)], [("residual", "f4"), ("more", "i8"),
+                                                                      ("number", "i8")])
+        for begin, end in ((0, 1), (1, 1), (1, 3)):
+            growing.extend("table", entries[begin:end])
+        assert table[...].tolist() == [(1, 0.5), (2, 0.25), (3, 0.125)]
 
 
 def test_entries_of_another_shape_are_refused_and_leave_the_dataset_alone(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "grown.h5", "w") as file:
         dataset = file.create_dataset("mine", (0, 3), "f8", maxshape=(None, 3))
-        with pytest.raises(ValueError, match="found entries of the shape"):
-            extend(dataset, np.zeros((2, 4)))
         with pytest.raises(ValueError, match="broadcast"):
             GrowingRows(file).append("mine", np.zeros(4))
         assert dataset.shape == (0, 3)

@@ -86,11 +86,11 @@ def read_libraries(files: Iterable[str]) -> Libraries:
 def list_mapped_files() -> list[str]:
     """The files that this process has mapped, each once, its libraries among them."""
     try:
-        lines = Path("/proc/self/maps").read_text().splitlines()
+        text = Path("/proc/self/maps").read_text()
     except OSError:
         return []
     # A path is all that has slashes in a line.
-    return list(dict.fromkeys(line[line.index("/"):] for line in lines if "/" in line))
+    return list(dict.fromkeys(re.findall("/.*", text)))
 
 
 def find_mpi_libraries(files: Iterable[str]) -> tuple[str, ...]:

@@ -101,6 +101,10 @@ class Watch:
 
         stopping: whether this is the place for it; laws that fail end the run anywhere.
         """
+        if self.comm.size == 1 and not self._laws:  # there is nobody to ask
+            if stopping and self._signals.asked:
+                raise StopError(*self._signals.asked)
+            return
         fault = find_fault(self._laws)
         sums = np.concatenate([np.zeros(0), *(law.sums for law in self._laws)])
         own = np.concatenate([[bool(self._signals.asked), bool(fault)], sums])

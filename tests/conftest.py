@@ -21,6 +21,16 @@ def pytest_collection() -> Iterator[None]:
     gc.freeze()
 
 
+# What takes long begins first: else one process would end with it while the others have nothing left.
+LONGEST_FIRST = ("parallel", "verification", "cli", "cases")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files are handed out in the order in which they were collected, those of short tests last."""
+    places = {name: k for k, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: places.get(item.path.parent.name, len(places)))
+
+
 @pytest.fixture
 def mpirun() -> Callable[..., subprocess.CompletedProcess[str]]:
     """`mpirun(ranks, *args, timeout=..., cwd=...)` runs `pbem args...`; see tests/parallel/launch.py."""

@@ -74,11 +74,11 @@ def _compare(results: Results, unit: float, modulus: float) -> tuple[float, list
     return force, ratios
 
 
-@pytest.mark.parametrize(("approach", "scheme"), [
-    (1e-5, "SST"), (1e-2, "SST"), (3e-4, "DBEM"), (2e-5, "HST"), (1e-3, "THST"),
+@pytest.mark.parametrize(("approach", "scheme", "sides"), [
+    (1e-5, "SST", 3), (1e-2, "SST", 3), (3e-4, "DBEM", 3), (2e-5, "HST", 2), (1e-3, "THST", 2),
 ])
-def test_a_disc_between_blocks(approach: float, scheme: str, tmp_path: Path) -> None:
-    results = pbem.run(_make(approach, scheme=scheme), output=tmp_path / "disc.h5")
+def test_a_disc_between_blocks(approach: float, scheme: str, sides: int, tmp_path: Path) -> None:
+    results = pbem.run(_make(approach, elements=12, scheme=scheme, sides=sides), output=tmp_path / "disc.h5")
     force, ratios = _compare(results, 1.0, 1.0)
     assert 0.04 * approach < force < 0.2 * approach
     # Of a peak that is flat, in nodes at most a quarter of the half-width away from it.
@@ -113,8 +113,10 @@ def test_the_same_pressures_elsewhere(
     """On elements of 1e-5 of the radius, whose ends, gaps and sums over whole bodies are rounded otherwise: 1e-6 to
     3e-5 of the largest pressure, if each place is rounded for itself."""
     pressures = []
-    for name, case in (("here", _make(approach, elements=12, scheme=scheme, sides=3)),
-                       ("there", _make(approach, unit, turn=turn, elements=12, scheme=scheme, sides=3))):
+    # With the hierarchical operator most of the time goes into the inverses of groups, by the cube of their size.
+    elements, sides = (12, 3) if operator == "dense" else (8, 2)
+    for name, case in (("here", _make(approach, elements=elements, scheme=scheme, sides=sides)),
+                       ("there", _make(approach, unit, turn=turn, elements=elements, scheme=scheme, sides=sides))):
         case["solver"] = {"operator": operator, "newton_tolerance": 1e-10}
         results = pbem.run(case, output=tmp_path / f"{name}.h5")
         assert len(results.elements.vertices) > 100, "graded"

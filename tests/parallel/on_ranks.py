@@ -8,7 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+import pbem
+from pbem.results.estimator import Estimator
 from pbem.results.reader import Results, open_results
 from tests.parallel.launch import TIMEOUT
 
@@ -71,10 +74,16 @@ def run_hierarchical(
     snippet: Launch, folder: Path, text: str, ranks: Sequence[int], *options: str, before: str = ""
 ) -> list[Results]:
     """The results of a case by the hierarchical operator, on each of these numbers of ranks, without estimated errors;
-    options: of PETSc; before: a piece of Python that comes first."""
+    options: of PETSc; before: a piece of Python that comes first. One rank is this process, where nothing comes first:
+    a launch starts the program once more."""
     (folder / "case.toml").write_text(text)
     results = []
     for count in ranks:
+        if count == 1 and not (before or options):
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr("pbem.driver.make_estimator", lambda model, mesh, *_: Estimator(model, mesh, None, None))
+                results.append(pbem.run(folder / "case.toml", folder / "1.h5", operator="hierarchical"))
+            continue
         done = snippet(count, before + WITHOUT_ERRORS, "run", "case.toml", "-o", f"{count}.h5", "--quiet",
                        "--operator", "hierarchical", *options, cwd=folder)  # fmt: skip
         assert done.returncode == 0, done.stderr

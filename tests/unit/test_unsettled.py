@@ -16,6 +16,7 @@ from tests.unit.test_nearby import draw_modes
 from tests.unit.test_sweeps import assemble, write_network
 
 WRONG = np.array([True, False])
+WEAKENING = "friction = 0.4, cohesion = 0.1, friction_dynamic = 0.3, slip_distance = 1e-3"
 
 
 @pytest.mark.parametrize(("law", "losing"), [
@@ -23,12 +24,12 @@ WRONG = np.array([True, False])
     ("friction = 0.4, cohesion = 0.1", True),
     ("friction = 0.4, cohesion = 0.1, tensile_strength = 0.05", True),
     ("friction = 0.4, cohesion = 0.1, cohesion_lost = true", False),
-    ("friction = 0.4, cohesion = 0.1, friction_dynamic = 0.3, slip_distance = 1e-3", False),
+    (WEAKENING, False),  # not as long as they touch
 ])  # fmt: skip
 def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -> None:
     problem = assemble(write_network(teeth=2, law=law))
     count = problem.mesh.pairs.count
-    assert (find_losing(problem.laws) == losing).all()
+    assert (find_losing(problem.laws) == (losing or law == WEAKENING)).all()
     violation = np.zeros(count)
     violation[[3, 5]] = 1.0, 2.0
     modes = draw_modes(count)
@@ -53,6 +54,21 @@ def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -
     assert limit.reason == "iteration limit"
     settled = replace(proposal, violation=np.zeros(count))
     assert describe_unsettled(problem, "mode cycle", modes, settled, group, wrong, dry).reason == "mode cycle"
+
+
+@pytest.mark.parametrize(("law", "reason"), [
+    (WEAKENING, "no admissible modes"), (WEAKENING.replace("cohesion = 0.1", "cohesion = 0"), "mode cycle"),
+])  # fmt: skip
+def test_where_friction_weakens_cohesion_is_blamed_for_pairs_that_part(law: str, reason: str) -> None:
+    problem = assemble(write_network(teeth=2, law=law))
+    count = problem.mesh.pairs.count
+    violation = np.zeros(count)
+    violation[3] = 1.0
+    modes, next_ones = draw_modes(count), draw_modes(count)
+    modes.mode[3], next_ones.mode[3] = STICK, OPEN
+    proposal = Proposal(next_ones, violation)
+    error = describe_unsettled(problem, "mode cycle", modes, proposal, np.array([], dtype=int), None, np.zeros(count))
+    assert error.reason == reason and ("cohesion_lost = true" in str(error)) == (reason == "no admissible modes")
 
 
 @pytest.mark.parametrize(("law", "fluid", "rough"), [

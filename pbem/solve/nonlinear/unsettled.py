@@ -49,12 +49,14 @@ def describe_unsettled(
     is_open, opens = modes.mode == OPEN, proposal.modes.mode == OPEN
     parted = find_friction_under_fluid(problem.laws, pressure) & (is_open | opens)
     parting = parted & proposal.changed & (is_open != opens)
+    # Where friction weakens with slip, too, pairs may change for other reasons than that, as long as they touch.
+    loses = find_losing(problem.laws) & (find_linear(problem.laws) | (is_open != opens))
     if reason != "iteration limit" and not (reason == "no admissible modes" and failed is not None):
-        losing = find_losing(problem.laws) & proposal.changed
+        losing = loses & proposal.changed
         if not losing.any() and not (failed is not None and failed.wrong.any()):
             losing = parting
         if losing.any():
-            return _blame_loss(problem, losing, proposal, parting)
+            return _blame_loss(problem, losing, proposal, loses, parting)
     if failed is not None and failed.wrong.any():
         return ConvergenceError(
             "unsound mesh",
@@ -74,30 +76,32 @@ def describe_unsettled(
         return ConvergenceError(
             reason,
             f"{others}no choice of stick, slip and open {certainty} the laws of these {those}: "
-            f"{_name(problem, changing)}; {_advise(problem.laws, group, changing, parting, parted)}",
+            f"{_name(problem, changing)}; {_advise(problem.laws, group, changing, loses, parting, parted)}",
         )
     return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
                             _list_places(problem, np.flatnonzero(proposal.changed)))
 
 
-def _advise(laws: PairLaws, group: Integer, changing: Integer, parting: Bool, parted: Bool) -> str:
+def _advise(laws: PairLaws, group: Integer, changing: Integer, loses: Bool, parting: Bool, parted: Bool) -> str:
     """Why pairs have no modes, and what to do, where they lose what they have back at once; else what may help.
 
     Of those that change, else of the group: friction alone always has modes, and which of the pairs around the end of
-    an opening changes last, and how, is chance. parting: see `_list_losses`; parted (m,): those that are open, too.
+    an opening changes last, and how, is chance. loses, parting: see `_list_losses`; parted (m,): those that are open,
+    too.
     """
-    losses = _list_losses(laws, changing, parting) or _list_losses(laws, group, parted)
+    losses = _list_losses(laws, changing, loses, parting) or _list_losses(laws, group, loses, parted)
     return "; ".join(losses) or "try shorter elements there, or smaller steps"
 
 
-def _list_losses(laws: PairLaws, group: Integer | Bool, parting: Bool) -> list[str]:
+def _list_losses(laws: PairLaws, group: Integer | Bool, loses: Bool, parting: Bool) -> list[str]:
     """What some pairs lose where they part and have back where they meet, with what makes it last, or go to zero.
 
-    parting (m,): pairs with friction that are to open, or to close again, under a fluid that is in open parts alone:
-    where closed ones pull and open ones overlap, which of the two comes last is chance.
+    loses (m,): pairs that lose their strength where they part. parting (m,): those with friction that are to open, or
+    to close again, under a fluid that is in open parts alone: where closed ones pull and open ones overlap, which of
+    the two comes last is chance.
     """
     losses = []
-    if find_losing(laws)[group].any():
+    if loses[group].any():
         lost = "tensile strength and cohesion are" if (laws.tensile_strength[group] > 0).any() else "cohesion is"
         losses.append(f"{lost} lost at once where faces part, and back where they meet: cohesion_lost = true makes "
                       "that loss last")
@@ -113,7 +117,8 @@ def find_losing(laws: PairLaws) -> Bool:
     losing = laws.tensile_strength > 0
     for group in laws.strengths:
         losing[group.pairs] |= group.parameters.get("cohesion", 0.0) > 0
-    return losing & ~laws.brittle & find_linear(laws)
+        losing[group.pairs] &= group.law.pivots_at_slip  # other laws may soften, or mean something else
+    return losing & ~laws.brittle
 
 
 def find_friction_under_fluid(laws: PairLaws, pressure: Real) -> Bool:
@@ -125,10 +130,12 @@ def find_friction_under_fluid(laws: PairLaws, pressure: Real) -> Bool:
     return rough & (pressure > 0) & ~laws.fluid_inside & find_linear(laws)
 
 
-def _blame_loss(problem: Problem, losing: Bool, proposal: Proposal, parting: Bool) -> ConvergenceError:
+def _blame_loss(
+    problem: Problem, losing: Bool, proposal: Proposal, loses: Bool, parting: Bool
+) -> ConvergenceError:
     """The error where pairs that lose their strength go on changing: what the search made of them last, a cycle or
     pairs of the wrong sign in a body that hangs on two of them, is chance."""
-    losses = "; ".join(_list_losses(problem.laws, losing | parting, parting))
+    losses = "; ".join(_list_losses(problem.laws, losing | parting, loses, parting))
     return ConvergenceError(
         "no admissible modes",
         f"{_describe_changed(problem, proposal)}; {losses}; then no "

@@ -31,6 +31,7 @@ from pbem.solve.nonlinear.smooth_search import (
     FIRST,
     FIRST_ALONE,
     LEAST,
+    NARROWEST,
     NEAR,
     PARTS,
     SmoothSearch,
@@ -428,6 +429,38 @@ def test_short_pairs_have_the_same_product_of_force_and_opening(
     for width in widths:
         # The hyperbola is pressure times opening = width^2 / r.
         np.testing.assert_allclose(width**2 * np.minimum(weight, mean), width.min() ** 2 * mean, rtol=1e-12)
+
+
+def test_the_path_begins_from_the_state_that_is_nearest_to_the_laws() -> None:
+    problem = assemble(grow_branches(0, 6))
+    count = problem.laws.count
+    memory, load = remember(0.0, count), problem.evaluate_load(0, 1.0)
+    search = SmoothSearch(problem, memory, load, True)
+    overlaps = [0.3, 0.1, 5.0]
+    for overlap in overlaps:
+        gap = np.full(count, -overlap) / problem.laws.stiffness
+        search._note(PairState(np.full(count, -2.0 - overlap), np.zeros(count), gap, memory.slip))
+    course = search._start(memory.modes, False)
+    # Pairs bear what they overlap: by this the laws are off.
+    np.testing.assert_allclose(-course.state.g_n * problem.laws.stiffness, 0.1, rtol=1e-12)
+    assert course.width == Width(pytest.approx(0.1 * smooth_search.WIDTH), pytest.approx(2.3 * NARROWEST))
+
+
+def test_the_last_width_stays_as_long_as_fewer_pairs_are_astray(
+    many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widths, text = record_widths(monkeypatch), grow_branches(0, 6)
+    march_over(text)
+    plain = len(widths)
+    for counts in ([0], [5, 5], [5, 4, 4], [3, 1, 0]):
+        widths.clear()
+        left = list(counts)
+        monkeypatch.setattr(SmoothSearch, "_count_astray", lambda at, state, width, left=left: left.pop(0))
+        march_over(text)
+        stays = len(counts) - 1
+        assert not left and len(widths) == plain + stays
+        for width in widths[len(widths) - stays :]:
+            np.testing.assert_allclose(width, widths[-1], rtol=1e-12)
 
 
 def test_pairs_that_are_off_are_counted_by_their_own_widths() -> None:

@@ -72,8 +72,10 @@ MOST_WIDENED = 1e3
 # It ends after so many iterations, or one with the last width in which no more than this part of all pairs, or so many,
 # change: with the true laws the few blocks that are left settle sooner.
 LONGEST, FEW, FEWEST = 40, 1e-2, 10
-# Or one with the last width after which pairs are off by no more than this once clusters have settled.
-SETTLED = 0.01
+# Or one with the last width after which pairs are off by no more than this once clusters have settled. In neither case
+# as long as ever fewer pairs are astray, off by more than so many widths: the statuses of all around them are no
+# better, though in the mean along all pairs of a large model they hardly count.
+SETTLED, ASTRAY = 0.01, 100
 # The part of the residual that is left, as blocks that are nearly free move by far more than it tells, and later ones,
 # in which they are freer, do not move them back; and in the iterations with the true laws that follow.
 CLOSELY = 1e-6
@@ -110,13 +112,15 @@ class Width:
 @dataclass(frozen=True)
 class SmoothCourse:
     """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, one
-    that the equations hold of (None: the same), the modes that hold all bodies, and the width."""
+    that the equations hold of (None: the same), the modes that hold all bodies, and the width; astray: pairs that were
+    off by more than ASTRAY of the last width."""
 
     modes: ModeState
     state: PairState
     holding: ModeState
     width: Width
     exact: PairState | None = None
+    astray: int | None = None
 
 
 class SmoothSearch:
@@ -198,10 +202,10 @@ class SmoothSearch:
         if self._course is None:
             self._course = self._start(modes, clusters is None)
         modes, state, holding = self._course.modes, self._course.state, self._course.holding
-        exact, width = self._course.exact or state, self._course.width
+        exact, width, astray = self._course.exact or state, self._course.width, self._course.astray
         proximal = PROXIMAL * problem.laws.own_stiffness
         for taken in range(self.taken, min(LONGEST, most)):
-            self._course = SmoothCourse(modes, state, holding, width, exact)
+            self._course = SmoothCourse(modes, state, holding, width, exact, astray)
             pause()
             if not 0 < width.value < np.inf:
                 break
@@ -232,8 +236,11 @@ class SmoothSearch:
             record.add(solved, modes, changed, begin)
             self.taken += 1
             few = part == 1 and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST)
-            if width.fall(part) <= width.last and (few or (clusters is not None and off <= SETTLED)):
-                break
+            if width.fall(part) <= width.last:
+                before_that, astray = astray, 0 if clusters is None else self._count_astray(state, width.last)
+                recovers = astray > 0 and (before_that is None or astray < before_that)
+                if not recovers and (few or (clusters is not None and off <= SETTLED)):
+                    break
             width = width.go_on(part, off, alone)
         return modes, state
 
@@ -258,6 +265,10 @@ class SmoothSearch:
         values, settled = clusters.solve(far, 4, settle)
         state = state.choose(PairState(*values.T), settled)
         return state, problem.decide(lambda: self._measure_off(state, width))
+
+    def _count_astray(self, state: PairState, width: float) -> int:
+        return self._problem.decide(lambda: int(np.count_nonzero(
+            self._find_violation(state, width) > ASTRAY * width * self._shape)))
 
     def _start(self, modes: ModeState, alone: bool) -> SmoothCourse:
         assert self._nearest is not None

@@ -51,15 +51,15 @@ def coarsen_model(model: Model) -> CoarseModel | None:
     """The model with neighbouring elements of each leg merged in pairs; None if there is nothing to make coarser.
 
     Where an arc would turn too far, or a crack with two tips would have one element, elements are kept. Where that
-    leaves too many of them, or whole interfaces, or long legs that have a single element (of outer curves at orders 2
-    and 3: constant elements may not hold what one linear element holds), the order is lowered instead.
+    leaves too many of them, or whole interfaces, or long legs that have a single element (above order 0; of outer
+    curves above order 1: constant elements may not hold what one linear element holds), the order is lowered instead.
     """
     curves = {name: _merge_pairs(curve, _least_elements(model, name)) for name, curve in model.curves.items()}
     before, after = (sum(count_elements(curve) for curve in each.values()) for each in (model.curves, curves))
     faces = {*model.interfaces, *(name for each in model.contacts.values() for name in (each.first, each.second))}
     numbers = {name: count_elements(model.curves[name]) for name in faces}
     kept = sum(number for name, number in numbers.items() if count_elements(curves[name]) == number)
-    single = _measure_single(model, faces)
+    single = _measure_single(model, faces) if model.analysis.order else 0.0
     if model.analysis.order > 1:
         single = max(single, _measure_single(model, model.conditions))
     if after <= COARSE * before and kept <= KEPT * sum(numbers.values()) and single <= SINGLE:

@@ -28,6 +28,8 @@ FIXED, MOVING = 1.0, 2.0
 # That of jumps on the elements of the second solution next to a tip, so many of them: between the power 3/2, which
 # would give 1.8, and smooth fields (scripts/bench_estimate.py --accuracy).
 TIP, AT_TIP = 4.0, 2
+# Where the order is lowered they fall with twice the power of what elements at tips lack, by the number of nodes.
+PAST_ROOT = 1.5
 # That of jumps on the element next to a corner, or to the mouth of a crack, where they follow other powers: over the
 # same problems 1.5 to 2.5, but less where a crack turns sharply: see `find_corner_power`. Legs that turn by more
 # (radians) have a corner.
@@ -94,13 +96,16 @@ def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
     model: of the run; smooth: away from tips and corners.
     """
     coarse, result = beside.mesh, np.full(beside.mesh.elements, smooth)
-    if beside.kind == "merged":
-        at_corner = _list_merged_ends(model, beside.model)
-        for name, own in list_curve_elements(beside.model, coarse):
-            at_start, at_end = model.crack_tips.get(name, (False, False))
-            result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(TIP, smooth)
-            for element, ratio, power in at_corner.get(name, ()):
-                result[own[element]] = min(result[own[element]], CORNER, ratio**power - 1)
+    lowered, at_tip = _count_lowered(beside), TIP
+    if beside.kind == "order":
+        at_tip = lowered ** (2 * PAST_ROOT) - 1
+    at_corner = _list_merged_ends(model, beside.model)
+    for name, own in list_curve_elements(beside.model, coarse):
+        at_start, at_end = model.crack_tips.get(name, (False, False))
+        result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(at_tip, smooth)
+        for element, ratio, power in at_corner.get(name, ()):
+            fall = lowered ** (2 * power) if beside.kind == "order" else ratio**power
+            result[own[element]] = min(result[own[element]], CORNER, fall - 1)
     return np.asarray(result[coarse.pairs.slave // (coarse.order + 1)])
 
 
@@ -108,10 +113,9 @@ def find_weak_ends(model: Model, beside: Beside) -> Bool:
     """Pairs of the second solution (c,) on elements beside ends of cracks on interfaces with a softer material, where
     jumps that vanish at the end follow a power below WEAK; model: of the run."""
     coarse, weak = beside.mesh, np.zeros(beside.mesh.elements, dtype=bool)
-    if beside.kind == "merged":
-        at_corner = _list_merged_ends(model, beside.model)
-        for name, own in list_curve_elements(beside.model, coarse):
-            weak[own[[element for element, _, power in at_corner.get(name, ()) if power < WEAK]]] = True
+    at_corner = _list_merged_ends(model, beside.model)
+    for name, own in list_curve_elements(beside.model, coarse):
+        weak[own[[element for element, _, power in at_corner.get(name, ()) if power < WEAK]]] = True
     return np.asarray(weak[coarse.pairs.slave // (coarse.order + 1)])
 
 
@@ -146,7 +150,7 @@ def list_force_shares(model: Model, beside: Beside, smooth: float) -> Real | Non
 
 def list_factor_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
     """The same for factors, of which only ends of cracks on interfaces with a softer material tell; None without."""
-    if beside.kind == "order" or all(end.power >= WEAK for end in list_corner_ends(model)):
+    if all(end.power >= WEAK for end in list_corner_ends(model)):
         return None
     return _list_shares(model, beside, smooth, WEAK)
 
@@ -156,7 +160,7 @@ def _list_shares(model: Model, beside: Beside, smooth: float, below: float) -> R
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
     by = np.full(beside.fine.elements, 1 / smooth)
-    lowered = (beside.fine.order + 1) / (beside.mesh.order + 1)
+    lowered = _count_lowered(beside)
     for name, own in list_curve_elements(beside.model, beside.mesh):
         for element, ratio, power in at_corner.get(name, ()):
             if power < below or math.isinf(below):
@@ -165,6 +169,11 @@ def _list_shares(model: Model, beside: Beside, smooth: float, below: float) -> R
                 more = lowered ** (2 * rate) if beside.kind == "order" else ratio**rate
                 by[at] = np.maximum(by[at], 1 / (more - 1))
     return np.asarray(by)
+
+
+def _count_lowered(beside: Beside) -> float:
+    """How many times as many nodes the elements of the run have."""
+    return (beside.fine.order + 1) / (beside.mesh.order + 1)
 
 
 def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int, float, float]]]:

@@ -13,6 +13,8 @@ from pbem.solve.problem.step import Unfinished
 from pbem.version import __version__
 
 GROUP = "unfinished"
+# Raised whenever what a search remembers changes: one that was kept by other code is begun anew.
+LAYOUT = 2
 
 
 def write_unfinished(file: h5py.File, unfinished: Unfinished, pairs: Integer) -> None:
@@ -25,7 +27,7 @@ def write_unfinished(file: h5py.File, unfinished: Unfinished, pairs: Integer) ->
     if unfinished.search:
         arrays: list[np.ndarray] = []
         group["search"] = json.dumps(_take_out(unfinished.search, arrays))
-        group["search"].attrs["pbem_version"] = __version__
+        group["search"].attrs.update({"pbem_version": __version__, "layout": LAYOUT})
         for number, array in enumerate(arrays):
             group[f"arrays/{number}"] = array
 
@@ -38,7 +40,8 @@ def read_unfinished(file: h5py.File, pairs: Integer) -> Unfinished | None:
     mode, sign = np.zeros(len(pairs), dtype=np.int8), np.ones(len(pairs))
     mode[pairs], sign[pairs] = group["mode"][...], group["sign"][...]
     search = {}
-    if "search" in group and group["search"].attrs["pbem_version"] == __version__:  # what it needs may change
+    kept = dict(group["search"].attrs) if "search" in group else {}
+    if kept.get("pbem_version") == __version__ and kept.get("layout") == LAYOUT:
         search = _put_back(json.loads(group["search"].asstr()[()]), group)
     return Unfinished(int(group.attrs["stage"]), float(group.attrs["factor"]), mode, sign, search)
 

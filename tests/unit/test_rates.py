@@ -146,6 +146,13 @@ def test_differences_at_corners_to_a_lower_order_are_divided_by_less(plate: Mode
     square[take_element(single, beside.fine, "left", 0)] = 2.0
     # Three nodes in place of two; at corners the error falls with twice the power of their number.
     assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(1.5 ** (2 * FORCE_RATE) - 1)
+    # So do jumps, by the power of the corner; at tips by 3/2.
+    jumps = choose_jump_divisors(single, beside, SMOOTH)
+    corner = 1.5 ** (2 * find_corner_power(math.radians(60))) - 1
+    for name, at_start, at_end in (("leg", 1.5**3 - 1, corner), ("wing", corner, 1.5**3 - 1)):
+        found = read_elements(beside, name, jumps)
+        np.testing.assert_allclose(found[[0, -1]], [at_start, at_end], rtol=1e-12)
+        assert found[len(found) // 2] == SMOOTH
     square[:] = 0.0
     square[take_element(single, beside.fine, "leg", 3)] = 2.0
     assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(SMOOTH)

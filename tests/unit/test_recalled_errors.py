@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 
 from pbem.errors import ConvergenceError
 from pbem.model.rigid_body_modes import RigidBodyMode
@@ -67,3 +68,17 @@ def test_errors_without_motions_and_of_files_with_less() -> None:
     check_equal(recall_error(describe_error(plain)), plain)
     told = {"reason": "mode cycle", "detail": "", "places": np.array([1 + 2j])}
     check_equal(recall_error(told), ConvergenceError("mode cycle", "", (1 + 2j,)))
+
+
+def test_a_search_that_other_code_kept_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pairs = np.arange(2)
+    unfinished = Unfinished(0, 0.5, np.zeros(2, dtype=np.int8), np.ones(2), {"course": 1})
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name in ("LAYOUT", "__version__"):
+            write_unfinished(file, unfinished, pairs)
+            kept = read_unfinished(file, pairs)
+            assert kept is not None and kept.search == {"course": 1}
+            with monkeypatch.context() as patch:
+                patch.setattr(f"pbem.results.unfinished.{name}", "another")
+                other = read_unfinished(file, pairs)
+            assert other is not None and other.search == {} and other.factor == 0.5

@@ -74,7 +74,9 @@ def test_beside_sides_with_a_single_element_the_order_is_lowered(
     assert coarse is not None and coarse.kind == kind
 
 
-@pytest.mark.parametrize(("order", "elements", "kind"), [(1, 1, "order"), (2, 1, "order"), (2, 2, "merged")])
+@pytest.mark.parametrize(("order", "elements", "kind"), [
+    (0, 1, "merged"), (1, 1, "order"), (2, 1, "order"), (2, 2, "merged"),
+])
 def test_beside_legs_of_cracks_with_a_single_element_the_order_is_lowered(
     plate: Model, order: int, elements: int, kind: str
 ) -> None:

@@ -111,9 +111,9 @@ class Width:
 
 @dataclass(frozen=True)
 class SmoothCourse:
-    """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, one
-    that the equations hold of (None: the same), the modes that hold all bodies, and the width; astray: pairs that were
-    off by more than ASTRAY of the last width."""
+    """What an iteration with smoothed laws begins with: modes; the state of all pairs that they were read from, but for
+    the first one, which begins from the nearest state of the search; one that the equations hold of (None: the same);
+    the modes that hold all bodies; and the width. astray: pairs that were off by more than ASTRAY of the last width."""
 
     modes: ModeState
     state: PairState
@@ -184,7 +184,7 @@ class SmoothSearch:
             float(max(np.abs(state.p_n + self._load.pressure).max(), np.abs(state.p_s).max()))))
         # Later ones have far larger tractions where a pair holds what nothing else does.
         self._largest = self._largest or largest
-        if violation < self._violation:
+        if self._nearest is None or violation < self._violation:
             self._nearest, self._violation = state, violation
 
     def find(

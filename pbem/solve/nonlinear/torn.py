@@ -15,7 +15,7 @@ from pbem.solve.nonlinear.search import Search
 from pbem.solve.nonlinear.unsettled import find_losing
 from pbem.solve.problem.problem import Problem
 
-# Pairs have met so often after they had parted, ...
+# Pairs have come together again so often after they had parted, ...
 OFTEN = 3
 # ... and are this part of those that change in so many iterations in turn, not before one of this number, ...
 MOST, IN_TURN, LATE = 2 / 3, 4, 16
@@ -31,7 +31,7 @@ class TornPairs:
         self._restart()
 
     def _restart(self) -> None:
-        self.parted = np.zeros(len(self._losing), dtype=bool)
+        self.open, self.parted = np.zeros((2, len(self._losing)), dtype=bool)
         self.met = np.zeros(len(self._losing), dtype=np.int64)
         self.turns = 0
 
@@ -40,10 +40,11 @@ class TornPairs:
         proposal = search.proposal
         if len(search.counts) <= 1:
             self._restart()
+        # What pairs ask for is not what they get, where caution or pivoting chooses.
+        was_open, self.open = self.open, modes.mode == OPEN
+        self.met[was_open & ~self.open & self.parted] += 1
+        self.parted |= self.open & ~was_open & (len(search.counts) > 1)
         changed = proposal.changed & self._losing
-        was_open, opens = modes.mode == OPEN, proposal.modes.mode == OPEN
-        self.met[changed & was_open & ~opens & self.parted] += 1
-        self.parted |= changed & opens & ~was_open
         torn = np.count_nonzero(changed & (self.met >= OFTEN))
         self.turns = self.turns + 1 if torn and torn >= MOST * np.count_nonzero(proposal.changed) else 0
 
@@ -51,5 +52,5 @@ class TornPairs:
         """Whether the search goes on with such pairs alone, and comes no nearer to an end."""
         if self.turns < IN_TURN or search.taken < LATE:
             return False
-        before, lately = search.counts[:-IN_TURN], search.counts[-IN_TURN:]
+        before, lately = search.counts[search.entered : -IN_TURN], search.counts[-IN_TURN:]
         return bool(before) and min(lately) >= min(before)

@@ -40,8 +40,8 @@ MOST_STEPS = 25
 # Instants in turn in which faces lack the strength that they lost in them: what follows leads to no equilibrium either.
 # And problems of one such instant, where friction changes with slip.
 MOST_PARTED, MOST_LACKING = 3, 10
-# Operations that they may take, all together; of more pairs than so many, as the cube of their number.
-MOST_EFFORT, OF_EFFORT = 5e10, 300
+# Operations that they may take, all together.
+MOST_EFFORT = 5e10
 
 Judge = Callable[[ModeState, PairState], Proposal]
 
@@ -68,8 +68,7 @@ def come_to_rest(
     single pairs give way in the wrong sense. (theory, 129)
     """
     own, instants = _measure_stiffness(response), 0
-    effort = OperationCount(MOST_EFFORT * max(subset.laws.count / OF_EFFORT, 1.0) ** 3)
-    subset = replace(subset, effort=effort)
+    subset = replace(subset, effort=OperationCount(MOST_EFFORT))
     if not _is_sound(subset, _damp(response, SOFTEST * own, response.values[:, 2:])):
         return Damped(None, None, 0)
     runs: ModeState | None = None

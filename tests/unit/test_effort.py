@@ -75,7 +75,7 @@ def test_a_search_that_has_spent_its_effort_takes_newtons_steps_alone() -> None:
     assert not search.is_spent()
 
 
-def test_dashpots_end_once_their_effort_is_spent_that_grows_with_the_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dashpots_end_once_their_effort_is_spent(monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(3)
     subset, response = pose(np.full(COUNT, 0.3), np.zeros(COUNT)), make_response(random, COUNT)
 
@@ -85,7 +85,3 @@ def test_dashpots_end_once_their_effort_is_spent_that_grows_with_the_pairs(monke
     assert rest().rest is not None
     monkeypatch.setattr(damped, "MOST_EFFORT", 0.0)
     assert rest().rest is None and rest().runs is None and rest().instants == 0
-    monkeypatch.setattr(damped, "MOST_EFFORT", ALWAYS)
-    assert rest().rest is None
-    monkeypatch.setattr(damped, "OF_EFFORT", COUNT // 3)  # 27 times as much for three times as many pairs
-    assert rest().rest is not None

@@ -193,14 +193,6 @@ def test_a_bonded_block_slides_at_its_limit_load(order: tuple[int, ...], weakens
     assert reached == pytest.approx(0.25 / 0.4, rel=0.02)
 
 
-def test_masonry_of_hundreds_of_pairs_is_asked() -> None:
-    """Walls of fourteen blocks have up to 448."""
-    model = parse_model(write_pushed_block(0.2, {"friction": 0.25}, elements=149))[1]
-    problem = assemble_problem(model, generate_mesh(model), world)
-    assert problem.laws.count == 447
-    assert can_be_damped(problem, problem.make_tangent())
-
-
 @pytest.mark.parametrize(("young", "gap"), [(1e4, 0.1), (1e5, 0.1), (2e6, 0.01), (2e6, 1e-3), (2e7, 0.3)])
 def test_a_block_slides_as_far_as_a_wall(young: float, gap: float) -> None:
     """However far that is beside its strains: it comes to rest there."""

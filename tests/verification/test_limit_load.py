@@ -33,16 +33,12 @@ from tests.verification.test_settling import BLOCKS, Listener, run
 pytestmark = pytest.mark.usefixtures("without_errors")
 
 
-def write_pushed_block(
-    shear: float, law: dict[str, float], unit: float = 1.0, shift: float = 0.0, elements: int | None = None
-) -> str:
-    """A block of 2 x 1 on another one, pressed by 1 and then pushed; unit: of lengths; elements: of their joint."""
+def write_pushed_block(shear: float, law: dict[str, float], unit: float = 1.0, shift: float = 0.0) -> str:
+    """A block of 2 x 1 on another one, pressed by 1 and then pushed; unit: of lengths."""
     curves = {
         name: {**curve, "points": [(point + shift * (1 + 1j)) * unit for point in curve["points"]]}
         for name, curve in BLOCKS["curves"].items()
     }
-    if elements:
-        curves["joint"] |= {"elements": elements}
     return write_case(
         BLOCKS | {
             "curves": curves,

@@ -77,9 +77,9 @@ class MapEntries:
 
     def add(self, field: int, node: Integer, unknown: Integer, coefficient: Complex) -> None:
         """Contributions that are wanted."""
-        values = np.ascontiguousarray(coefficient, dtype=complex).view(float).reshape(-1, 2)
-        at, component = np.nonzero(values)
-        self._append(2 * self._nodes * field + 2 * node[at] + component, unknown[at], values[at, component])
+        for component, value in enumerate((coefficient.real, coefficient.imag)):
+            kept = value != 0
+            self._append((2 * self._nodes * field + 2 * node + component)[kept], unknown[kept], value[kept])
 
     def add_entries(self, rows: Integer, columns: Integer, values: Real) -> None:
         """Entries as they are, of which those that are wanted are taken."""

@@ -16,11 +16,11 @@ from pbem.solve.problem.step import Former, Step
 GROUP = "former"
 
 
-def write_former(file: h5py.File, before: Step | None, step: Step, pairs: Integer, stored: int = 0) -> None:
+def write_former(file: h5py.File, before: Step | None, step: Step, pairs: Integer, stored: int) -> None:
     """Keep what is known of loads beyond a step that is stored, and what is needed of the step before it, unless that
     was stored as well or of another stage.
 
-    pairs: in the order of `join_pairs`; stored: the number of the last step that was stored.
+    pairs: in the order of `join_pairs`; stored: the number of the last step that was stored, 0 without.
     """
     if step.ahead:
         group = file.require_group(GROUP)

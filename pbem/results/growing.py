@@ -36,7 +36,10 @@ class GrowingRows:
 
     def extend(self, path: str, entries: NDArray[Any]) -> None:
         """Add entries (n,) with names for their columns, of which those are taken that the dataset has: files of
-        earlier versions that are gone on with have fewer."""
+        earlier versions that are gone on with have fewer.
+
+        Raises KeyError if there is no such dataset, ValueError for a column of it that the entries lack.
+        """
         rows = self._open(path)
         values = np.empty(len(entries), dtype=rows.kind)
         for name in rows.kind.names:

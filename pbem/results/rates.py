@@ -96,16 +96,13 @@ def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
     model: of the run; smooth: away from tips and corners.
     """
     coarse, result = beside.mesh, np.full(beside.mesh.elements, smooth)
-    lowered, at_tip = _count_lowered(beside), TIP
-    if beside.kind == "order":
-        at_tip = lowered ** (2 * PAST_ROOT) - 1
+    at_tip = TIP if beside.kind == "merged" else _find_rise(beside, 1.0, PAST_ROOT) - 1
     at_corner = _list_merged_ends(model, beside.model)
     for name, own in list_curve_elements(beside.model, coarse):
         at_start, at_end = model.crack_tips.get(name, (False, False))
         result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(at_tip, smooth)
         for element, ratio, power in at_corner.get(name, ()):
-            fall = lowered ** (2 * power) if beside.kind == "order" else ratio**power
-            result[own[element]] = min(result[own[element]], CORNER, fall - 1)
+            result[own[element]] = min(result[own[element]], CORNER, _find_rise(beside, ratio, power) - 1)
     return np.asarray(result[coarse.pairs.slave // (coarse.order + 1)])
 
 
@@ -160,20 +157,21 @@ def _list_shares(model: Model, beside: Beside, smooth: float, below: float) -> R
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
     by = np.full(beside.fine.elements, 1 / smooth)
-    lowered = _count_lowered(beside)
     for name, own in list_curve_elements(beside.model, beside.mesh):
         for element, ratio, power in at_corner.get(name, ()):
             if power < below or math.isinf(below):
                 at = fine[own[element]]
                 rate = 2 * power if power < WEAK else FORCE_RATE
-                more = lowered ** (2 * rate) if beside.kind == "order" else ratio**rate
-                by[at] = np.maximum(by[at], 1 / (more - 1))
+                by[at] = np.maximum(by[at], 1 / (_find_rise(beside, ratio, rate) - 1))
     return np.asarray(by)
 
 
-def _count_lowered(beside: Beside) -> float:
-    """How many times as many nodes the elements of the run have."""
-    return (beside.fine.order + 1) / (beside.mesh.order + 1)
+def _find_rise(beside: Beside, ratio: float, power: float) -> float:
+    """How many times as large errors are in the second solution that fall with a power of the length of an element,
+    `ratio` times as long in it; where the order is lowered, with twice that power of the number of nodes (theory, 126).
+    """
+    nodes = (beside.fine.order + 1) / (beside.mesh.order + 1)
+    return float(ratio**power if beside.kind == "merged" else nodes ** (2 * power))
 
 
 def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int, float, float]]]:

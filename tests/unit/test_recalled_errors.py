@@ -56,7 +56,7 @@ def test_what_is_known_beyond_a_step_keeps_all_of_an_error(tmp_path: Path) -> No
     ceiling = Ceiling(0.75, 0.8, np.inf, 0.75, error)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["steps/number"] = np.zeros(0, dtype=int)
-        write_former(file, None, replace(step, ahead=describe_ceiling(ceiling)), np.arange(0))
+        write_former(file, None, replace(step, ahead=describe_ceiling(ceiling)), np.arange(0), 0)
         found = recall_ceiling(read_ahead(file, step.number))
     assert (found.failed, found.free, found.balanced, found.tried) == (0.75, 0.8, np.inf, 0.75)
     assert found.error is not None

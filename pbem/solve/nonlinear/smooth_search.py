@@ -94,10 +94,10 @@ class Width:
         value = self.value * float(np.sqrt(1 - part + part * self.aim))
         return self.last if value < self.last * (1 + ROUNDING) else value
 
-    def go_on(self, part: float, off: float, alone: float) -> Width:
+    def go_on(self, part: float, off: float, left: float) -> Width:
         """The width of the next iteration, after one that went a part of its way and leaves pairs so much off.
 
-        alone: how much it left them off before clusters settled by themselves. (theory, 132)
+        left: how much it left them off before clusters settled by themselves. (theory, 132)
         """
         value = self.fall(part)
         if off > CENTRED:
@@ -105,7 +105,7 @@ class Width:
         elif self.aim == 1:  # what such a step leaves says nothing of one that aims at less
             aim = AIM
         else:
-            aim = min(AIM, (alone / EXPECTED * (value / self.value) ** 2) ** 2)
+            aim = min(AIM, (left / EXPECTED * (value / self.value) ** 2) ** 2)
         return replace(self, value=value, aim=max(aim, (self.last / value) ** 2))
 
 
@@ -226,7 +226,7 @@ class SmoothSearch:
             found = take_off_proximal(problem.laws, self.smooth, whole, state, proximal)
             part, off = problem.decide(lambda now=state, new=found, at=width: self._choose_part(now, new, at))  # type: ignore[misc]
             before, state, exact = modes, state.approach(found, part), exact.approach(whole, part)
-            alone = off
+            left = off
             if clusters is not None:
                 state, off = self._settle_clusters(clusters, state, exact, width.fall(part), off)
                 tangent.expect(stack_states(state))
@@ -241,7 +241,7 @@ class SmoothSearch:
                 recovers = astray > 0 and (before_that is None or astray < before_that)
                 if not recovers and (few or (clusters is not None and off <= SETTLED)):
                     break
-            width = width.go_on(part, off, alone)
+            width = width.go_on(part, off, left)
         return modes, state
 
     def _settle_clusters(

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
@@ -219,6 +220,39 @@ def test_an_unexpected_error_shows_one_traceback(
     err = capsys.readouterr().err
     assert err.count("Traceback") == err.count("ZeroDivisionError: a slip of ours") == 1
     assert open_results("blocks.h5").status == "failed"
+
+
+# The program, interrupted once, while it imports the module of argument 1.
+INTERRUPTED_AT_ITS_START = """
+import runpy, sys
+left = [sys.argv.pop(1)]
+
+class Interrupting:
+    def find_spec(self, name, path, target=None):
+        if name in left:
+            left.remove(name)
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Interrupting())
+runpy.run_module("pbem", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.parametrize(("module", "rank", "said"), [
+    ("argparse", 0, "pbem: interrupted\n"), ("pbem.environment", 0, "pbem: interrupted\n"), ("pbem.wording", 1, ""),
+])
+def test_interrupting_the_start_is_said_in_a_line(module: str, rank: int, said: str, folder: Path) -> None:
+    """By the first rank, also before the command line has been imported."""
+    command = [sys.executable, "-c", INTERRUPTED_AT_ITS_START, module, "run", "blocks.toml"]
+    environment = os.environ | {"OMPI_COMM_WORLD_RANK": str(rank), "OMPI_COMM_WORLD_SIZE": "2"}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", said)
+
+
+def test_the_command_is_the_process_of_the_package() -> None:
+    root, target = Path(__file__).parents[2], "pbem.__main__:main"
+    assert tomllib.loads((root / "pyproject.toml").read_text())["project"]["scripts"] == {"pbem": target}
+    assert f"- pbem = {target}\n" in (root / "scripts" / "packaging" / "recipe.yaml").read_text()
 
 
 def test_interrupting_a_run_is_said_in_a_line(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:

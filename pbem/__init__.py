@@ -20,24 +20,23 @@ as (theory, 12): formula 12 of `pbem help theory`.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from pbem.errors import (
-    CaseError,
-    ConvergenceError,
-    ExportError,
-    LaunchError,
-    LawError,
-    PbemError,
-    PlotError,
-    ResultFileError,
-    StopError,
-    StorageError,
-)
-from pbem.loading import load_at_once
 from pbem.version import __version__
 
 if TYPE_CHECKING:
     from pbem.case.case import Case
     from pbem.driver import run
+    from pbem.errors import (
+        CaseError,
+        ConvergenceError,
+        ExportError,
+        LaunchError,
+        LawError,
+        PbemError,
+        PlotError,
+        ResultFileError,
+        StopError,
+        StorageError,
+    )
     from pbem.results.reader import open_results
     from pbem.sweeps.sweep import sweep
 
@@ -47,14 +46,19 @@ __all__ = [
     "StopError", "StorageError", "__version__", "open_results", "run", "sweep",
 ]
 
-# Looked up at first use: whoever imports the package for something else waits for neither MPI nor HDF5.
-_AT_FIRST_USE = {"Case": "pbem.case.case", "run": "pbem.driver", "open_results": "pbem.results.reader",
-                 "sweep": "pbem.sweeps.sweep"}
+# Looked up at first use: whoever imports the package for something else waits for neither MPI nor HDF5, and the command
+# line is soon where an interruption is reported as one (pbem.__main__).
+_AT_FIRST_USE = {
+    "Case": "pbem.case.case", "run": "pbem.driver", "open_results": "pbem.results.reader", "sweep": "pbem.sweeps.sweep",
+    **{name: "pbem.errors" for name in __all__ if name.endswith("Error")},
+}
 
 
 def __getattr__(name: str) -> Any:
     if name not in _AT_FIRST_USE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from pbem.loading import load_at_once
+
     with load_at_once():
         value = globals()[name] = getattr(import_module(_AT_FIRST_USE[name]), name)
     return value

@@ -239,7 +239,7 @@ runpy.run_module("pbem", run_name="__main__", alter_sys=True)
 
 
 @pytest.mark.parametrize(("module", "rank", "said"), [
-    ("argparse", 0, "pbem: interrupted\n"), ("pbem.environment", 0, "pbem: interrupted\n"), ("pbem.wording", 1, ""),
+    ("argparse", 0, "pbem: interrupted\n"), ("pbem.errors", 0, "pbem: interrupted\n"), ("pbem.wording", 1, ""),
 ])
 def test_interrupting_the_start_is_said_in_a_line(module: str, rank: int, said: str, folder: Path) -> None:
     """By the first rank, also before the command line has been imported."""

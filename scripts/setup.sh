@@ -14,7 +14,7 @@ system_packages=(
     python3-mpi4py python3-petsc4py libpetsc-real-dev python3-h5py python3-h5py-mpi openmpi-bin libopenblas0-pthread
 )
 # Single commands need these; a distribution may lack them.
-optional_packages=(python3-meshio python3-ezdxf python3-pandas)
+optional_packages=(python3-ezdxf python3-pandas)
 # Of these the ones of the distribution stay, whatever else is installed into .venv: wheels bring another MPI and HDF5.
 kept_packages=(numpy h5py mpi4py petsc4py)
 # What the distributions lack or have too old.
@@ -29,7 +29,6 @@ fail() {
 # What a package is for, where it is left out.
 name_use() {
     case $1 in
-        python3-meshio) echo "pbem import of binary .msh files" ;;
         python3-ezdxf) echo "pbem import of .dxf files" ;;
         *) echo "to_dataframe, and some tests" ;;
     esac

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from pbem.errors import CaseError, Fault, PbemError
+from pbem.errors import Fault, PbemError
+from pbem.importing.msh_lines import LINES, POINT, SURFACES, BinaryLines, TextLines, count_nodes, read_integer
 from pbem.importing.reading import Reading, fail, read_text
 from pbem.wording import list_names
 
-# Number of nodes of the kinds of elements; of the corners, which come first; and of those on each edge, which follow.
-LINES = {1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
-SURFACES = {2: (3, 3, 0), 3: (4, 4, 0), 9: (6, 3, 1), 10: (9, 4, 1), 16: (8, 4, 1), 21: (10, 3, 2), 23: (15, 3, 3),
-            36: (16, 4, 2), 37: (25, 4, 3)}
-POINT = 15
 # Dimension and tag.
 Entity = tuple[int, int]
 SEVERAL = "For entities with several physical groups the first one is used."
@@ -51,7 +43,8 @@ class Grid:
     """What a mesh holds.
 
     nodes: by tag; names: of physical groups, by dimension and number; between: nodes of edges of higher order, by the
-    tags of both corners, from the smaller one to the other; points: numbers of those of physical groups, by group.
+    tags of both corners, from the smaller one to the other; points: numbers of those of physical groups, by group;
+    shared: of groups by dimension and number, how many of their elements are in another group, by the one that is used.
     """
 
     nodes: dict[int, complex] = field(default_factory=dict)
@@ -63,6 +56,7 @@ class Grid:
     between: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
     points: Counter[int] = field(default_factory=Counter)
     groups: dict[frozenset[int], int] = field(default_factory=dict, repr=False)
+    shared: dict[tuple[int, int], Counter[int]] = field(default_factory=dict, repr=False)
 
     def add(self, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
         """Take in an element. Raises ValueError for one that no plane has."""
@@ -70,8 +64,7 @@ class Grid:
             if group:
                 self.points[group] += 1
             return
-        if kind not in LINES and kind not in SURFACES:
-            raise ValueError(f"an element of type {kind}; expected points, lines, triangles and quadrangles of a plane")
+        count_nodes(kind)
         number, inner = (2, LINES[kind] - 2) if kind in LINES else SURFACES[kind][1:]
         corners, others = nodes[:number], nodes[number:]
         for at, (a, b) in enumerate(zip(corners, (*corners[1:], corners[0]), strict=True) if inner else ()):
@@ -82,19 +75,25 @@ class Grid:
         first = self.groups.setdefault(frozenset(corners), group) or group
         self.groups[frozenset(corners)] = first
         if first and first != group:
-            if SEVERAL not in self.notes:
-                self.notes.append(SEVERAL)
+            self.share(1 if kind in LINES else 2, group, first)
             return
         (self.lines if kind in LINES else self.surfaces).append(Cell(corners, group, entity))
+
+    def share(self, dimension: int, group: int, used: int) -> None:
+        """Note that an element of a group is in another one as well, which is used."""
+        if SEVERAL not in self.notes:
+            self.notes.append(SEVERAL)
+        if group:
+            self.shared.setdefault((dimension, group), Counter())[used] += 1
 
 
 def read_mesh(path: Path) -> Grid:
     """The mesh of a file, text or binary. Raises PbemError with what is wrong with it."""
     try:
-        head = path.read_bytes()[:200]
+        data = path.read_bytes()
     except OSError as error:
         raise PbemError(f"{path}: {error.strerror or error}") from None
-    return _read_by_meshio(path) if _is_binary(head) else read_grid(path, read_text(path))
+    return _read_grid(path, BinaryLines(data) if _is_binary(data[:200]) else TextLines(read_text(path)))
 
 
 def _is_binary(head: bytes) -> bool:
@@ -102,55 +101,33 @@ def _is_binary(head: bytes) -> bool:
     return len(words) > 1 and words[1] == b"1"
 
 
-class _Lines:
-    """The lines of a text, one after the other."""
-
-    def __init__(self, text: str) -> None:
-        self._lines = text.splitlines()
-        self.number = 0
-
-    def next(self) -> str:
-        if self.number >= len(self._lines):
-            raise ValueError("the end of the file; expected more of it")
-        self.number += 1
-        return self._lines[self.number - 1].strip()
-
-    def words(self, least: int = 1) -> list[str]:
-        words = self.next().split()
-        if len(words) < least:
-            raise ValueError(f"'{' '.join(words)[:60]}'; expected {least} numbers")
-        return words
-
-    def integers(self, least: int = 1) -> list[int]:
-        return [_read_integer(word) for word in self.words(least)]
-
-    @property
-    def ended(self) -> bool:
-        return self.number >= len(self._lines)
-
-
-def _read_integer(word: str) -> int:
-    try:
-        return int(word)
-    except ValueError:
-        raise ValueError(f"'{word[:40]}'; expected a whole number") from None
-
-
-def read_grid(path: Path, text: str) -> Grid:
-    """The mesh of a text. Raises CaseError with the line that is wrong."""
-    lines, grid = _Lines(text), Grid()
+def _read_grid(path: Path, lines: TextLines) -> Grid:
+    """The mesh of a file. Raises CaseError with the line or the byte where it is wrong."""
+    grid = Grid()
     try:
         _read_sections(lines, grid)
     except ValueError as error:
         found, _, expected = str(error).partition("; expected ")
-        raise fail(path, [Fault(f"line {max(lines.number, 1)}", found, expected or EXPECTED)]) from None
+        raise fail(path, [Fault(lines.place, found, expected or EXPECTED)]) from None
     faults = _check(grid)
     if faults:
         raise fail(path, faults)
+    _tell_shared(grid)
     return grid
 
 
-def _read_sections(lines: _Lines, grid: Grid) -> None:
+def _tell_shared(grid: Grid) -> None:
+    """Say which groups have lost elements to others, whose names these have."""
+    for (dimension, group), used in sorted(grid.shared.items()):
+        what, name = "line" if dimension == 1 else "surface", grid.names.get((dimension, group), str(group))
+        others = list_names([f"'{grid.names.get((dimension, each), str(each))}'" for each in used])
+        number = used.total()
+        have = "has" if number == 1 else "have"
+        grid.notes.append(f"Of the physical {what} '{name}' {number} element{'s' * (number > 1)} {have} the name of "
+                          f"{others} instead.")
+
+
+def _read_sections(lines: TextLines, grid: Grid) -> None:
     version = ""
     known: dict[Entity, _Entity] = {}
     while not lines.ended:
@@ -197,7 +174,7 @@ def _read_name(line: str) -> tuple[int, int, str]:
     quoted = len(name) > 1 and name[0] == name[-1] == '"'
     if len(words) != 3 or ('"' in name and not quoted):
         raise ValueError(f'\'{line[:60]}\'; expected dimension, number and "name" of a physical group')
-    return _read_integer(words[0]), _read_integer(words[1]), name[1:-1] if quoted else name
+    return read_integer(words[0]), read_integer(words[1]), name[1:-1] if quoted else name
 
 
 def _read_node(grid: Grid, tag: int, words: list[str]) -> None:
@@ -213,13 +190,13 @@ def _read_node(grid: Grid, tag: int, words: list[str]) -> None:
     grid.nodes[tag], grid.heights[tag] = complex(x, y), z
 
 
-def _read_nodes_2(lines: _Lines, grid: Grid) -> None:
+def _read_nodes_2(lines: TextLines, grid: Grid) -> None:
     for _ in range(lines.integers()[0]):
         words = lines.words(4)
-        _read_node(grid, _read_integer(words[0]), words[1:])
+        _read_node(grid, read_integer(words[0]), words[1:])
 
 
-def _read_nodes_4(lines: _Lines, grid: Grid) -> None:
+def _read_nodes_4(lines: TextLines, grid: Grid) -> None:
     for _ in range(lines.integers(4)[0]):
         _, _, _, count = lines.integers(4)[:4]
         tags = [lines.integers()[0] for _ in range(count)]
@@ -227,18 +204,18 @@ def _read_nodes_4(lines: _Lines, grid: Grid) -> None:
             _read_node(grid, tag, lines.words(3))
 
 
-def _read_entities(lines: _Lines) -> dict[Entity, _Entity]:
+def _read_entities(lines: TextLines) -> dict[Entity, _Entity]:
     """Entities by dimension and tag."""
     known = {}
     for dimension, count in enumerate(lines.integers(4)[:4]):
         for _ in range(count):
             words = lines.words(5 if dimension == 0 else 8)
-            tag = _read_integer(words[0])
+            tag = read_integer(words[0])
             known[dimension, tag] = _Entity(tag, _read_list(words, 4 if dimension == 0 else 7)[0])
     return known
 
 
-def _read_partitions(lines: _Lines, whole: Mapping[Entity, _Entity]) -> dict[Entity, _Entity]:
+def _read_partitions(lines: TextLines, whole: Mapping[Entity, _Entity]) -> dict[Entity, _Entity]:
     """The parts that partitions make of entities, which belong to the groups of these; and the curves between parts of
     a surface, which belong to none."""
     lines.integers()
@@ -248,7 +225,7 @@ def _read_partitions(lines: _Lines, whole: Mapping[Entity, _Entity]) -> dict[Ent
     for dimension, count in enumerate(lines.integers(4)[:4]):
         for _ in range(count):
             words = lines.words(5)
-            tag, *parent = (_read_integer(word) for word in words[:3])
+            tag, *parent = (read_integer(word) for word in words[:3])
             partitions, after = _read_list(words, 3)
             groups = _read_list(words, after + (3 if dimension == 0 else 6))[0]
             above = whole.get((parent[0], parent[1]))
@@ -264,13 +241,13 @@ def _read_list(words: list[str], at: int) -> tuple[tuple[int, ...], int]:
     """Whole numbers after their count; and where the words go on after them."""
     if at >= len(words):
         raise ValueError(f"'{' '.join(words)[:60]}'; expected {at + 1} numbers")
-    end = at + 1 + _read_integer(words[at])
+    end = at + 1 + read_integer(words[at])
     if end > len(words):
         raise ValueError(f"'{' '.join(words)[:60]}'; expected {end} numbers")
-    return tuple(_read_integer(word) for word in words[at + 1:end]), end
+    return tuple(read_integer(word) for word in words[at + 1:end]), end
 
 
-def _read_elements_2(lines: _Lines, grid: Grid) -> None:
+def _read_elements_2(lines: TextLines, grid: Grid) -> None:
     own: set[int] = set()
     ghosts: set[int] = set()
     for _ in range(lines.integers()[0]):
@@ -287,14 +264,14 @@ def _read_elements_2(lines: _Lines, grid: Grid) -> None:
                           "several files, this one holds only a part of it.")
 
 
-def _read_elements_4(lines: _Lines, grid: Grid, known: Mapping[Entity, _Entity]) -> None:
+def _read_elements_4(lines: TextLines, grid: Grid, known: Mapping[Entity, _Entity]) -> None:
     filled: set[int] = set()
     for _ in range(lines.integers(4)[0]):
         dimension, tag, kind, count = lines.integers(4)[:4]
         entity = known.get((dimension, tag), _Entity(tag, ()))
-        if len(entity.groups) > 1 and SEVERAL not in grid.notes:
-            grid.notes.append(SEVERAL)
         for _ in range(count):
+            for group in entity.groups[1:] if dimension in (1, 2) else ():
+                grid.share(dimension, abs(group), abs(entity.groups[0]))
             _add(grid, kind, tuple(lines.integers()[1:]), entity.groups[0] if entity.groups else 0, entity.tag)
         filled |= set(entity.partitions) if dimension == 2 and count else set()
     named = {part for (dimension, _), entity in known.items() if dimension == 2 for part in entity.partitions}
@@ -336,56 +313,3 @@ def _check(grid: Grid) -> list[Fault]:
         found = f"nodes at heights from {min(heights):g} to {max(heights):g}"
         return [Fault("the mesh", found, "a mesh of a plane of constant z")]
     return []
-
-
-def _read_by_meshio(path: Path) -> Grid:
-    """A binary mesh."""
-    if b"$PartitionedEntities" in path.read_bytes():
-        # Of which meshio reads no groups.
-        expected = "a mesh in one part (UnpartitionMesh of gmsh) or a text (gmsh -bin 0)"
-        raise fail(path, [Fault("the file", "a binary mesh in partitions", expected)])
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            import meshio
-    except ImportError as error:
-        raise PbemError(
-            f"{path}: binary meshes are read by meshio, which is missing ({error}): apt-get install "
-            "python3-meshio, run pip install meshio, or write the mesh as text (gmsh -bin 0)"
-        ) from None
-    read: Callable[[str], Any] = meshio.gmsh.read
-    try:
-        with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
-            warnings.simplefilter("ignore")
-            mesh = read(str(path))
-            return _take(mesh, path)
-    except CaseError:
-        raise
-    except (Exception, SystemExit) as error:  # whatever a library says of a file that is none of its own
-        found = f"what meshio cannot read ({type(error).__name__}: {error})"
-        expected = f"{EXPECTED}; a text file (gmsh -bin 0) would allow the line to be reported"
-        raise fail(path, [Fault("the file", found[:200], expected)]) from None
-
-
-def _take(mesh: Any, path: Path) -> Grid:
-    grid = Grid(names={(int(dimension), int(number)): name for name, (number, dimension) in mesh.field_data.items()})
-    for tag, (x, y, z) in enumerate(mesh.points):
-        _read_node(grid, tag, [repr(float(value)) for value in (x, y, z)])
-    kinds = {"vertex": POINT, "line": 1, "line3": 8, "line4": 26, "line5": 27, "line6": 28, "triangle": 2,
-             "triangle6": 9, "triangle10": 21, "triangle15": 23, "quad": 3, "quad8": 16, "quad9": 10, "quad16": 36,
-             "quad25": 37}
-    for number, block in enumerate(mesh.cells):
-        if block.type not in kinds:
-            expected = "lines, triangles and quadrangles of a plane"
-            raise fail(path, [Fault("the mesh", f"elements '{block.type}'", expected)])
-        kind = kinds[block.type]
-        groups, entities = (
-            mesh.cell_data[key][number] if key in mesh.cell_data else [0] * len(block.data)
-            for key in ("gmsh:physical", "gmsh:geometrical")
-        )
-        for nodes, group, entity in zip(block.data.tolist(), groups, entities, strict=True):
-            grid.add(kind, tuple(nodes), abs(int(group)), int(entity))
-    faults = _check(grid)
-    if faults:
-        raise fail(path, faults)
-    return grid

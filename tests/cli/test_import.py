@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import ezdxf
-import meshio
 import numpy as np
 import pytest
 
@@ -586,18 +585,6 @@ def test_a_wide_plate_with_a_hole_has_kirschs_stresses() -> None:
     ratio = 0.5 / 0.75
     expected = 0.5 * (1 + ratio**2) + 0.5 * (1 + 3 * ratio**4)
     assert pbem.open_results("plate.h5").interior.stress[-1][0][0] == pytest.approx(expected, rel=0.01)
-
-
-@pytest.mark.filterwarnings("ignore")  # of the library that writes the file
-def test_binary_meshes_are_read_by_meshio() -> None:
-    expected = bring_in("ring.msh", write_2(make_ring(24, 3, 1.0, 2.0)))
-    meshio.gmsh.write("binary.msh", meshio.gmsh.read("ring.msh"), fmt_version="2.2", binary=True)
-    assert main(["import", "binary.msh", "-o", "binary.toml"]) == 0
-    found = tomllib.loads(Path("binary.toml").read_text())
-    assert sorted(found["regions"]) == sorted(expected["regions"]) == ["ring"]
-    assert [curve["radius"] for curve in found["curves"].values()] == pytest.approx([1, 2])
-    Path("binary.msh").write_bytes(Path("binary.msh").read_bytes()[:300])
-    assert main(["import", "binary.msh", "-o", "cut.toml"]) == 2
 
 
 def test_a_polygon_stays_one(capsys: Capture) -> None:

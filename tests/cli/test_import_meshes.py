@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import cmath
 import math
+import re
+import struct
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ from typing import Any
 import pytest
 
 from pbem.cli import main
+from tests.cli.gmsh_binary import PACKED, unpack
 from tests.cli.gmsh_sample import Mesh, make_block, make_polygon, make_row, write_2, write_4, write_parts
 
 Capture = pytest.CaptureFixture[str]
@@ -75,9 +78,52 @@ def test_one_file_of_several_of_version_2_is_refused_or_told(ghosts: bool, capsy
         assert "All surface elements are of partition 3" in capsys.readouterr().out
 
 
-def test_a_binary_mesh_in_partitions_is_refused_for_that_reason(capsys: Capture) -> None:
-    said = refuse(b"$MeshFormat\n4.1 1 8\n\1\0\0\0\n$EndMeshFormat\n$PartitionedEntities\n", capsys)
-    assert "found a binary mesh in partitions; expected a mesh in one part" in said
+@pytest.mark.parametrize("version", PACKED)
+def test_binary_meshes_are_read_as_texts_are(version: str, capsys: Capture) -> None:
+    Path("mesh.msh").write_bytes(unpack(version))
+    assert main(["import", "mesh.msh", "-o", "made.toml"]) == 0
+    tables = tomllib.loads(Path("made.toml").read_text(encoding="utf-8"))
+    assert {name: sorted(table["boundary"]) for name, table in tables["regions"].items()} == {
+        "first": ["first_edge.1", "first_edge.2", "left", "seam"],
+        "zweiter Körper": ["right", "seam", "zweiter Körper_edge.1", "zweiter Körper_edge.2"],
+    }
+    ends = {name: sorted(map(tuple, tables["curves"][name]["points"])) for name in ("left", "seam", "right")}
+    assert ends == {name: [(x, 0), (x, 1)] for name, x in (("left", 0), ("seam", 1), ("right", 2))}
+    # Both are in another group as well, which is told in files of all kinds.
+    said = capsys.readouterr().out
+    assert "Of the physical line 'ends' 2 elements have the name of 'left', 'right' instead." in said
+
+
+@pytest.mark.parametrize("version", PACKED)
+def test_binary_meshes_that_are_cut_short_are_refused_with_the_byte(version: str, capsys: Capture) -> None:
+    data = unpack(version)
+    end = data.rindex(b"$EndElements")
+    for count in (*range(30, end, 37), end - 1, end + 5):
+        found = int(re.search(r"byte (\d+): found", refuse(data[:count], capsys)).group(1))  # type: ignore[union-attr]
+        assert 0 < found <= count + 1
+
+
+def test_binary_meshes_with_other_orders_of_bytes_and_wrong_numbers(capsys: Capture) -> None:
+    data = unpack("2.2")
+    head, _, nodes = data.partition(b"$Nodes\n")
+    count, _, rest = nodes.partition(b"\n")
+    records = struct.iter_unpack("<i3d", rest[:28 * int(count)])
+    swapped = b"".join(struct.pack(">i3d", *each) for each in records)
+    words = rest[28 * int(count):].partition(b"$Elements\n")
+    number, _, elements = words[2].partition(b"\n")
+    end = elements.index(b"\n$EndElements")
+    turned = b"".join(elements[k:k + 4][::-1] for k in range(0, end, 4))
+    other = (head.replace(b"\1\0\0\0", b"\0\0\0\1") + b"$Nodes\n" + count + b"\n" + swapped + words[0]
+             + b"$Elements\n" + number + b"\n" + turned + elements[end:])
+    Path("mesh.msh").write_bytes(other)
+    assert main(["import", "mesh.msh", "-o", "made.toml"]) == 0
+    Path("first.msh").write_bytes(data)
+    assert main(["import", "first.msh", "-o", "first.toml"]) == 0
+    made, first = (tomllib.loads(Path(name).read_text(encoding="utf-8")) for name in ("made.toml", "first.toml"))
+    assert made["curves"] == first["curves"] and made["regions"] == first["regions"]
+    assert "found the bytes 02 00 00 00" in refuse(data.replace(b"\1\0\0\0", b"\2\0\0\0", 1), capsys)
+    tags = unpack("4.1").replace(b"$Nodes\n", b"$Nodes\n" + b"\xff" * 20, 1)
+    assert "byte" in refuse(tags, capsys)
 
 
 def test_names_are_what_stands_between_the_quotation_marks() -> None:

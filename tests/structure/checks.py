@@ -32,7 +32,6 @@ DOORS = {
     "h5py": ("results",),
     "tomllib": ("case",),
     "matplotlib": ("results",),
-    "meshio": ("importing",),
     "ezdxf": ("importing",),
 }
 

@@ -60,6 +60,7 @@ from pbem.model.steep_loads import shorten_under_loads
 from pbem.model.support_motions import check_independent
 from pbem.model.thin_bodies import list_bonded
 from pbem.model.tools import check_tools, divide_tools, make_tool_regions, orient_tools
+from pbem.model.traces import find_traces
 from pbem.model.varying import Varying
 from pbem.wording import list_names
 
@@ -271,7 +272,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
         contacts={name: replace(each, overlap=topology.overlaps.get(name, 0.0))
                   for name, each in loading.contacts.items()},
         rigid=loading.rigid.bodies,
-        groups=case.groups,
+        groups=case.groups, traces=find_traces(case, fitted.curves),
         ties=fitted.ties,
         point_loads=topology.points.loads,
         point_supports=topology.supports,

@@ -258,7 +258,8 @@ class Model:
     point_loads: where forces act at single points. point_supports: where points of free bodies are.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     refined: elements were halved after the case was read, where contacts did not settle or end. given_gradings: curves
-    whose grading is the user's, and those by expressions, whose elements are chords.
+    whose grading is the user's, and those by expressions, whose elements are chords. traces: of the curves that are
+    pieces of a trace the name of that.
     """
 
     title: str
@@ -292,6 +293,7 @@ class Model:
     point_supports: Mapping[str, PointSupport] = field(default_factory=dict)
     refined: bool = False
     given_gradings: frozenset[str] = frozenset()
+    traces: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def timed(self) -> bool:

@@ -18,7 +18,7 @@ from pbem.wording import list_names, show
 
 def dump_configuration(model: Model) -> str:
     """JSON text of the model without the texts that it was read from and how it was made; complex points as [x, y]."""
-    texts = ("source", "notes", "law_texts", "overrides", "refined", "given_gradings")
+    texts = ("source", "notes", "law_texts", "overrides", "refined", "given_gradings", "traces")
     return json.dumps({key: value for key, value in to_plain(model).items() if key not in texts})
 
 

@@ -102,7 +102,7 @@ def find_curves(results: Results, names: Sequence[str]) -> list[str]:
     Raises ValueError if there are none.
     """
     known = list(dict.fromkeys([*results.contact, *results.nodes.curve_names]))
-    found = find_names(names, known)
+    found = find_names(names, known, results.contact.traces)
     return list(dict.fromkeys(
         each for name, chosen in found.items()
         for each in ([name] if name not in known and results.contact.get(name) is not None else chosen)

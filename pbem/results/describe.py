@@ -20,7 +20,6 @@ from pbem.results.text_tables import shorten as _shorten
 from pbem.results.text_tables import shorten_between as _shorten_between
 from pbem.results.text_tables import table as _table
 from pbem.results.tip_notes import doubt_factors, explain_missing_factors
-from pbem.results.trace_names import name_trace
 from pbem.results.traces import list_traces
 from pbem.solve.steps.open_faces import describe_pushed
 from pbem.wording import count as _count
@@ -162,7 +161,7 @@ def _describe_traces(results: Results, most: int) -> list[str]:
     if not most:
         return []
     laws = zip(results.pairs.names, results.pairs.laws, strict=True)
-    free = {name_trace(name) for name, law in laws if law != "bonded"}
+    free = {results.contact.traces[name] for name, law in laws if law != "bonded"}
     found = [each for each in list_traces(results) if each.name in free]
     rows = [[each.name, *([str(each.pieces)] if any(one.pieces > 1 for one in found) else []),
              *map(_number, (each.length, each.mean_slip, each.largest_slip, each.mean_opening, each.largest_opening,

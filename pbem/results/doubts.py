@@ -11,7 +11,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.mortar_pairs import FEWEST
 from pbem.model.model import Contact, Model
 from pbem.model.varying import Places, evaluate
-from pbem.results.law_text import find_trace, name_many
+from pbem.results.law_text import name_many
 
 # Elements on the zone in which bonds soften.
 ZONE_ELEMENTS = 3
@@ -32,8 +32,8 @@ def find_smooth(model: Model) -> list[str]:
     ]
     if not names:
         return []
-    return [f"{name_many(names)}: Coulomb's law without friction, the default; closed faces slide freely. Give "
-            "`friction` or `friction_angle`, or set law = \"frictionless\" if that is intended."]
+    return [f"{name_many(names, model.traces)}: Coulomb's law without friction, the default; closed faces slide "
+            "freely. Give `friction` or `friction_angle`, or set law = \"frictionless\" if that is intended."]
 
 
 def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
@@ -44,14 +44,15 @@ def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
         joint = find_joint(model, name)
         if not isinstance(joint, Contact) and joint.law.kind not in ("bonded", "open"):
             # The pieces of a trace that was cut go on in each other.
-            sizes[find_trace(name)] = sizes.get(find_trace(name), 0) + np.unique(element[part]).size
+            trace = model.traces.get(name, name)
+            sizes[trace] = sizes.get(trace, 0) + np.unique(element[part]).size
     found: dict[int, list[str]] = {}
     for name, count in sizes.items():
         if 0 < count < FEWEST:
             found.setdefault(count, []).append(name)
     return [
-        f"{name_many(names)}: contact on {count} element{'s' * (count != 1)}, which do not resolve its pressure; "
-        f"{FEWEST} or more are needed." for count, names in sorted(found.items())
+        f"{name_many(names, model.traces)}: contact on {count} element{'s' * (count != 1)}, which do not resolve "
+        f"its pressure; {FEWEST} or more are needed." for count, names in sorted(found.items())
     ]
 
 
@@ -80,9 +81,10 @@ def find_long(model: Model, mesh: Mesh) -> list[str]:
     found.sort(key=lambda each: -each[0])
     _, longest, zone_length, _ = found[0]
     at_worst = ", at the worst" if len(found) > 1 else ""
-    return [f"{name_many([name for *_, name in found])}: elements of {longest:.3g}, where the bonds soften over a zone "
-            f"of the length E' G/strength^2 = {zone_length:.3g}{at_worst}; with less than {ZONE_ELEMENTS} elements on "
-            "it the strength that is found depends on the mesh."]
+    names = name_many([name for *_, name in found], model.traces)
+    return [f"{names}: elements of {longest:.3g}, where the bonds soften over a zone of the length E' G/strength^2 "
+            f"= {zone_length:.3g}{at_worst}; with less than {ZONE_ELEMENTS} elements on it the strength "
+            "that is found depends on the mesh."]
 
 
 def _split(mesh: Mesh) -> list[np.ndarray]:

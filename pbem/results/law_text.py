@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +13,6 @@ from pbem.model.varying import Value, to_plain
 from pbem.results.text_tables import shorten
 from pbem.wording import count
 
-# A piece of a trace that was cut is called TRACE.NUMBER.
-PIECE = re.compile(r"(?P<trace>.+)\.(?P<number>[1-9]\d*)\Z")
 NUMBERED = re.compile(r"(?P<stem>.*?)(?P<number>0|[1-9]\d*)\Z", re.DOTALL)
 # Names in a row, runs of numbers counting as one.
 MOST_NAMES = 6
@@ -58,10 +56,10 @@ _FIELDS = (
 
 def list_law_rows(model: Model) -> list[list[str]]:
     """Rows below TITLES; what a law does not know is "-"."""
-    return [_make_row(each) for each in collect_equal_laws(model)]
+    return [_make_row(each, model.traces) for each in collect_equal_laws(model)]
 
 
-def _make_row(each: LawOfMany) -> list[str]:
+def _make_row(each: LawOfMany, traces: Mapping[str, str]) -> list[str]:
     law = each.law
     known = law.kind in ("coulomb", "cohesive")
     strengths = [f"{value:g}" if known else "-" for value in (law.friction, law.cohesion)]
@@ -84,16 +82,19 @@ def _make_row(each: LawOfMany) -> list[str]:
     told += " in closed parts too" if any(each.pressure) and law.pressurised == "all" else ""
     bonded = law.kind == "bonded"
     return [
-        f"{name_many(each.names, each.kind)}", " ".join(parts), *strengths, tension, ", ".join(weakening) or "-", joint,
-        "-" if bonded else gap, "-" if bonded else told,
+        name_many(each.names, traces, each.kind), " ".join(parts), *strengths, tension, ", ".join(weakening) or "-",
+        joint, "-" if bonded else gap, "-" if bonded else told,
     ]
 
 
-def name_many(names: Sequence[str], kind: str = "curve") -> str:
-    """Names in few words: pieces by their trace, names with numbers in a row by first and last, of many the number."""
+def name_many(names: Sequence[str], of: Mapping[str, str], kind: str = "curve") -> str:
+    """Names in few words: pieces by their trace, names with numbers in a row by first and last, of many the number.
+
+    of: the trace of every piece.
+    """
     traces: dict[str, list[str]] = {}
     for name in names:
-        traces.setdefault(find_trace(name), []).append(name)
+        traces.setdefault(of.get(name, name), []).append(name)
     traces = {pieces[0] if len(pieces) == 1 else trace: pieces for trace, pieces in traces.items()}
     runs = _join_runs(traces)
     text = ", ".join(runs) if len(runs) <= MOST_NAMES else f"{runs[0]}, {runs[1]}, ..."
@@ -102,12 +103,6 @@ def name_many(names: Sequence[str], kind: str = "curve") -> str:
         return text
     many = count(len(traces), kind)
     return f"{text} ({many}{f' in {len(names)} pieces' if pieces else ''})"
-
-
-def find_trace(name: str) -> str:
-    """The name of the trace that a piece belongs to; of others their own."""
-    piece = PIECE.match(name)
-    return piece["trace"] if piece else name
 
 
 def _join_runs(names: Iterable[str]) -> list[str]:

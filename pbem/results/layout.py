@@ -201,6 +201,7 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
     interfaces = sort_pairs(mesh)
     group.attrs["names"] = _text(list(interfaces))
     group.attrs["groups"] = json.dumps([dataclasses.asdict(each) for each in model.groups])
+    group.attrs["traces"] = _text([model.traces.get(name, name) for name in interfaces])
     group.attrs["laws"] = _text([find_joint(model, name).law.kind for name in interfaces])
     counts = [len(pairs) for pairs in interfaces.values()]
     order = join_pairs(interfaces)

@@ -16,7 +16,7 @@ from pbem.arrays import Integer, Real
 from pbem.results.contents import Elements
 from pbem.results.opening import freeze, open_quietly
 from pbem.results.pair_weights import find_nodes, weigh_pairs, weigh_values
-from pbem.results.trace_names import is_piece, number_piece
+from pbem.results.trace_names import list_pieces, number_piece
 from pbem.wording import suggest
 
 INTEGRABLE = ("opening", "slip", "traction_n", "traction_s")
@@ -278,8 +278,10 @@ class Interfaces(Mapping[str, Contact]):
     were there; the names that are listed, counted and asked for with `in` are those of the pieces.
     """
 
-    def __init__(self, path: Path, names: tuple[str, ...], steps: int) -> None:
+    def __init__(self, path: Path, names: tuple[str, ...], steps: int, traces: Mapping[str, str]) -> None:
+        """traces: the trace of each, which is itself where it is no piece."""
         self._path = path
+        self.traces = traces
         self._names = dict.fromkeys(names)
         self._steps = steps
         self._found: dict[str, Contact] = {}
@@ -299,7 +301,7 @@ class Interfaces(Mapping[str, Contact]):
             return _read_contact(self._path, file, name, self._steps)
 
     def _join(self, trace: str) -> JoinedContact:
-        names = sorted((name for name in self._names if is_piece(name, trace)), key=number_piece)
+        names = sorted(list_pieces(trace, self._names, self.traces), key=number_piece)
         if not names:
             raise KeyError(trace)
         pieces = tuple(self[name] for name in names)

@@ -93,12 +93,12 @@ class BodyPicture:
         if options.interfaces is None:
             self._names = choose_interfaces(results, self._steps)
         else:
-            found = find_names(options.interfaces, names).values()
+            found = find_names(options.interfaces, names, results.contact.traces).values()
             self._names = list(dict.fromkeys(name for each in found for name in each))
         if options.labels is None:
             self._labels = {name: [name] for name in self._names}
         else:
-            self._labels = find_names(options.labels, names)
+            self._labels = find_names(options.labels, names, results.contact.traces)
         given = [results.displacement_at(at) for at in self._steps]
         moved = [np.nan_to_num(each) for each in given]
         largest = max(moved, key=lambda each: float(np.abs(each).max(initial=0.0)), default=np.zeros((1, 2)))

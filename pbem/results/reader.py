@@ -24,7 +24,7 @@ from pbem.results.balance import read_balance
 from pbem.results.contents import Balances, Elements, Energies, Errors, Linearities, Nodes, Steps, Tips, Units
 from pbem.results.journal import is_being_written
 from pbem.results.layout import ENERGIES, read_fractions
-from pbem.results.lazy import AllPairs, Contact, Interfaces, InteriorPoints
+from pbem.results.lazy import AllPairs, Interfaces, InteriorPoints
 from pbem.results.linearity import read_linearity
 from pbem.results.notes import read_notes
 from pbem.results.opening import freeze, open_quietly, read_names, refuse_damage
@@ -38,6 +38,7 @@ from pbem.results.sections import (
     read_reactions,
     read_steps,
     read_tips,
+    read_traces,
 )
 from pbem.results.trial import check_contents
 
@@ -78,7 +79,7 @@ class Results:
     elements: Elements
     steps: Steps
     reactions: Mapping[str, Real]
-    contact: Mapping[str, Contact]
+    contact: Interfaces
     pairs: AllPairs
     groups: tuple[GeneratedGroup, ...]
     tips: Mapping[str, Tips]
@@ -325,7 +326,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         ),
         steps=steps,
         reactions=read_reactions(file, k),
-        contact=Interfaces(path, read_names(file["contact"]), k),
+        contact=Interfaces(path, read_names(file["contact"]), k, read_traces(file)),
         pairs=_read_pairs(path, file["contact"], k),
         groups=tuple(GeneratedGroup(**each) for each in json.loads(str(file["contact"].attrs["groups"]))),
         tips=read_tips(file, k),

@@ -14,7 +14,7 @@ from pbem.results.contents import Errors, Steps, Tips
 from pbem.results.layout import TIP_DATASETS, count_steps
 from pbem.results.lazy import InteriorPoints
 from pbem.results.opening import freeze, read_names
-from pbem.results.trace_names import is_piece, number_piece
+from pbem.results.trace_names import list_pieces, name_trace, number_piece
 
 
 def read_energy(file: h5py.File, kind: str, k: int) -> Real:
@@ -51,13 +51,14 @@ class CrackTips(Mapping[str, Tips]):
     are listed, counted and asked for with `in` are those of the pieces.
     """
 
-    def __init__(self, tips: Mapping[str, Tips]) -> None:
+    def __init__(self, tips: Mapping[str, Tips], traces: Mapping[str, str]) -> None:
         self._tips = tips
+        self._traces = traces
 
     def __getitem__(self, name: str) -> Tips:
         if name in self._tips:
             return self._tips[name]
-        pieces = sorted((each for each in self._tips if is_piece(each, name)), key=number_piece)
+        pieces = sorted(list_pieces(name, self._tips, self._traces), key=number_piece)
         if not pieces:
             raise KeyError(name)
         first, last = (self._tips[pieces[at]] for at in (0, -1))
@@ -82,7 +83,7 @@ def read_tips(file: h5py.File, steps: int) -> CrackTips:
     """Stress-intensity factors, J and T (steps, 2) at both ends of each crack; NaN where the file lacks them."""
     names = read_names(file["tips"])
     if not names:
-        return CrackTips({})
+        return CrackTips({}, {})
     group = file["all/tips"]
     unknown = np.full((steps, len(names), 2), np.nan)  # to older versions
     values = {kind: freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS}
@@ -90,7 +91,16 @@ def read_tips(file: h5py.File, steps: int) -> CrackTips:
     return CrackTips({
         name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
         for number, name in enumerate(names)
-    })
+    }, read_traces(file))
+
+
+def read_traces(file: h5py.File) -> dict[str, str]:
+    """The trace of each interface, itself where it is no piece; by their names in files of earlier versions."""
+    group = file["contact"]
+    names = read_names(group)
+    if "traces" not in group.attrs:
+        return {name: name_trace(name) for name in names}
+    return dict(zip(names, map(str, group.attrs["traces"]), strict=True))
 
 
 def read_errors(file: h5py.File, steps: int) -> Errors:

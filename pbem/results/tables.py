@@ -14,7 +14,7 @@ from pbem.errors import ResultFileError
 from pbem.results.lazy import JoinedContact
 from pbem.results.reader import Results
 from pbem.results.rigid import COMPONENTS
-from pbem.results.trace_names import find_names, is_piece, name_trace
+from pbem.results.trace_names import find_names, is_piece
 from pbem.wording import list_names, suggest
 
 Table = dict[str, NDArray[Any]]
@@ -39,12 +39,12 @@ def make_table(results: Results, what: str) -> Table:
     if name in results.contact:
         return _tabulate_contact(results, name)
     try:
-        names = find_names([name], list(results.contact))[name]
+        names = find_names([name], list(results.contact), results.contact.traces)[name]
         if all(is_piece(each, name) for each in names):
             return _tabulate_trace(results, name)
         return _tabulate_pieces(results, names)
     except ValueError as error:
-        hint = suggest(name, [*known, *results.contact, *map(name_trace, results.contact)]) or ";"
+        hint = suggest(name, [*known, *results.contact, *results.contact.traces.values()]) or ";"
         raise ResultFileError(str(results.path), f"has no table '{what}'{hint} it has {list_names(known)}") from error
 
 

@@ -71,7 +71,7 @@ class TracePicture:
         _refuse_empty(results)
         self._results, self._quantity, self._options = results, quantity, options
         self._box = choose_box(results, options.box)
-        self._labels = find_names(options.labels, list(results.contact))
+        self._labels = find_names(options.labels, list(results.contact), results.contact.traces)
         self._segments, self._lengths = list_segments(results)
         self._seen: Bool = self._box.contains(results.pairs.position)
         self._values = {at: self._read(at) for at in steps}

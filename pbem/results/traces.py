@@ -11,7 +11,6 @@ from pbem.arrays import Real
 from pbem.model.material import Material
 from pbem.results.pair_weights import weigh_pairs, weigh_values
 from pbem.results.reader import Results
-from pbem.results.trace_names import name_trace
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ def list_traces(results: Results, step: int = -1) -> list[TraceTotals]:
     nodes = results.nodes
     plain, rooted = weigh_pairs(results.elements, nodes.position, nodes.order, pairs.node)
     numbers: dict[str, int] = {}
-    of = np.array([numbers.setdefault(name_trace(name), len(numbers)) for name in pairs.names])
+    of = np.array([numbers.setdefault(results.contact.traces[name], len(numbers)) for name in pairs.names])
     trace, count = of[pairs.interface], len(numbers)
     slip, opening = pairs.at("slip", step), pairs.at("opening", step)
     modulus = _find_moduli(results)[pairs.interface]

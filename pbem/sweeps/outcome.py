@@ -72,7 +72,8 @@ def list_quantity_names(model: Model, mesh: Mesh) -> Names:
     contact = tuple(sort_pairs(mesh))
     for name in dict.fromkeys((*model.curves, *contact)):
         stem, dot, piece = name.rpartition(".")
-        while dot and piece.isdecimal() and stem not in model.curves:
+        trace = model.traces.get(name, "")  # v1.2 of v1.2.1 where a user calls curves v1.2 and v1.3
+        while dot and piece.isdecimal() and stem not in model.curves and len(stem) >= len(trace):
             families.setdefault(stem, []).append(name)
             stem, dot, piece = stem.rpartition(".")  # of a piece that is cut again
     return Names(

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.contact.laws import OPEN, SLIP, STICK
-from pbem.results.reader import Contact, Results
+from pbem.results.lazy import Contact
+from pbem.results.reader import Results
 from tests.cases.sampling import find_element_ends, sample_contact
 
 MODES = {"stick": STICK, "slip": SLIP, "open": OPEN}

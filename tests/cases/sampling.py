@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pbem.results.reader import Contact, Results
+from pbem.results.lazy import Contact
+from pbem.results.reader import Results
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -18,6 +20,7 @@ from pbem.results.animation import animate
 from pbem.results.curve_picture import find_curves
 from pbem.results.curve_profile import read_profile
 from pbem.results.label_room import part_labels
+from pbem.results.law_text import list_law_rows
 from pbem.results.page import Page
 from pbem.results.picture_limits import Limits
 from pbem.results.plots import BodyOptions, BodyPicture
@@ -226,6 +229,46 @@ def test_pieces_that_are_cut_again_belong_to_their_trace(tmp_path: Path) -> None
     _, model = parse_model(cut.case)
     names = list_quantity_names(model, generate_mesh(model))
     assert names.families["t"] == ("t.1.1", "t.1.2", "t.2") and names.families["t.1"] == ("t.1.1", "t.1.2")
+
+
+def test_curves_that_are_called_like_pieces_are_none(tmp_path: Path) -> None:
+    # Two of them are cut by x; of v1 and v2 nothing is said, and their curves are apart.
+    curves = {"v1.2": [[-1, 0], [2, 0]], "v1.3": [[-1, 2], [2, 2]], "v2.1": [[4, 0], [4, 2]], "v2.2": [[6, 0], [6, 2]],
+              "x": [[0, -1], [0.3, 3]]}  # fmt: skip
+    results = pbem.run({
+        "materials": {"rock": {"young": 1000.0, "poisson": 0.25}},
+        "curves": {name: {"points": points, "elements": 6} for name, points in curves.items()},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": [*curves]}},
+        "interfaces": {name: {"friction": 0.2} for name in curves},
+        "remote": {"syy": -1.0, "sxy": 0.5}, "analysis": {"steps": 1},
+    }, tmp_path / "a.h5")  # fmt: skip
+    lengths = {name: abs(complex(*b) - complex(*a)) for name, (a, b) in curves.items()}
+    pieces = {"v1.2": 2, "v1.3": 2, "v2.1": 1, "v2.2": 1, "x": 3}
+    totals = {each.name: each for each in list_traces(results)}
+    assert {name: each.pieces for name, each in totals.items()} == pieces
+    for name, each in totals.items():
+        assert each.length == pytest.approx(lengths[name])
+    assert results.contact["v1.2"].pairs == sum(results.contact[f"v1.2.{k}"].pairs for k in (1, 2))
+    assert results.contact.get("v1") is None and results.tips.get("v1") is None
+    with pytest.raises(ValueError, match="there is no interface or crack 'v1'"):
+        find_names(["v1"], list(results.contact), results.contact.traces)
+    # What is not cut may be asked for together, as with a pattern.
+    assert find_names(["v2", "v1.3"], list(results.contact), results.contact.traces) == {
+        "v2": ["v2.1", "v2.2"], "v1.3": ["v1.3.1", "v1.3.2"],
+    }  # fmt: skip
+    _, model = parse_model(results.case)
+    assert list_law_rows(model)[0][0] == "v1.2, v1.3, v2.1, v2.2, x (5 cracks in 9 pieces)"
+    families = list_quantity_names(model, generate_mesh(model)).families
+    assert "v1" not in families and families["v1.2"] == ("v1.2.1", "v1.2.2")
+
+
+def test_files_of_earlier_versions_have_traces_by_names(cut: Results, tmp_path: Path) -> None:
+    path = shutil.copy(cut.path, tmp_path / "b.h5")
+    with h5py.File(path, "a") as file:
+        del file["contact"].attrs["traces"]
+    older = open_results(path)
+    assert dict(older.contact.traces) == dict(cut.contact.traces)
+    assert [each.name for each in list_traces(older)] == [each.name for each in list_traces(cut)]
 
 
 def test_animations_have_a_frame_for_each_step(results: Results, tmp_path: Path) -> None:

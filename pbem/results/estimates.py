@@ -24,6 +24,7 @@ from pbem.results.rates import (
     list_force_shares,
 )
 from pbem.results.short_zones import bound_short_zones
+from pbem.results.stuck_ends import StuckEnds
 from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
@@ -118,7 +119,8 @@ class Comparison:
         self._absence = Absence(model, mesh, np.zeros(0, dtype=np.int64))
         # A stiff region goes along with a soft one: the energy of that is none of its own.
         self._modulus = np.array([region.material.plane_modulus for region in model.regions])[mesh.region]
-        self._gap = collect_laws(model, mesh).gap
+        laws = collect_laws(model, mesh)
+        self._gap, self._stuck_ends = laws.gap, StuckEnds(model, mesh, laws)
         self.energy, self.jumps = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
         self.scales = Scales()
         if beside is not None:
@@ -230,7 +232,8 @@ class Comparison:
         contact = self._absence.blank(replace(step, interior=None)).contact
         if self._as_they_are:
             return np.zeros((len(contact.slip), 2))
-        return bound_short_zones(self._model, self._sorted, contact.opening - self._gap, contact.slip)
+        of_zones = bound_short_zones(self._model, self._sorted, contact.opening - self._gap, contact.slip)
+        return np.maximum(of_zones, self._stuck_ends.bound(replace(step, contact=contact)))
 
     def _bound_factors(self, contact: ContactState, jumps: Real) -> Real:
         """The least error (cracks, 1) of the factors of each crack for the errors (i,) of the interfaces' jumps."""

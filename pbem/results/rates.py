@@ -188,12 +188,13 @@ def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int,
 
 @dataclass(frozen=True)
 class LegEnd:
-    """An end of a leg at a corner: curve, its element there (along all legs) and that element's length; the power of
-    the distance that jumps follow there, infinite where it is not known."""
+    """An end of a leg at a corner, its start or its other end: curve, its element there (along all legs) and that
+    element's length; the power of the distance that jumps follow there, infinite where it is not known."""
 
     curve: str
     element: int
     length: float
+    at_start: bool
     power: float = math.inf
 
 
@@ -205,7 +206,8 @@ def list_corner_ends(model: Model) -> list[LegEnd]:
         number = 0
         for leg in curve.legs:
             lengths = leg.length * np.diff(leg.element_fractions())
-            first, last = LegEnd(name, number, lengths[0]), LegEnd(name, number + leg.elements - 1, lengths[-1])
+            first = LegEnd(name, number, lengths[0], True)
+            last = LegEnd(name, number + leg.elements - 1, lengths[-1], False)
             meeting.setdefault(leg.start, []).append((first, leg.tangent(False)))
             meeting.setdefault(leg.end, []).append((last, -leg.tangent(True)))
             number += leg.elements

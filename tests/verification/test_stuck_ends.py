@@ -69,6 +69,34 @@ def test_faces_that_stick_on_all_meshes(order: int, tmp_path: Path) -> None:
     assert results.errors.relative["jumps"][-1] < 1e-2
 
 
+def test_the_estimate_does_not_depend_on_the_curves(tmp_path: Path) -> None:
+    """Nor on their directions, and corners within a curve count as those between curves."""
+    found = []
+    for reversed_ones in ((), ("seat",), ("top",)):
+        case = make_block(0.45, 4)
+        for name in reversed_ones:
+            case["curves"][name]["points"].reverse()
+        found.append(pbem.run(case, tmp_path / "block.h5", force=True).errors.slip["joint"][-1])
+    assert found[0] > 0
+    np.testing.assert_allclose(found, found[0], rtol=1e-8)
+    corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]
+    sides = {f"side_{k}": {"points": corners[k : k + 2], "elements": 3} for k in range(4)}
+    round_about = [corners[k] for k in (2, 1, 0, 3, 2)]
+    found = []
+    for curves in (sides, {"all": {"points": round_about, "elements": [3] * 4}}):
+        results = pbem.run({
+            "materials": {"rock": {"young": 1.0, "poisson": 0.25}, "steel": {"young": 3.0, "poisson": 0.3}},
+            "curves": curves, "remote": {"sxx": -0.01, "syy": -0.02}, "analysis": {"steps": 1},
+            "regions": {"plane": {"material": "rock", "infinite": True, "boundary": list(curves)},
+                        "grain": {"material": "steel", "boundary": list(curves)}},
+            "interfaces": {name: {"law": "coulomb", "friction": 1.2} for name in curves},
+        }, tmp_path / "grain.h5", force=True)
+        assert not any(each.mode.any() for each in results.contact.values())
+        found.append(max(each[-1] for each in results.errors.slip.values()))
+    assert found[0] > 0
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
+
+
 def test_the_accuracy_asked_for_refines_where_faces_would_slip(tmp_path: Path) -> None:
     """Reactions alone are good enough at once."""
     case = make_block(0.42, 3, 3)

@@ -171,6 +171,10 @@ install_python_packages() {
         --no-deps --no-build-isolation -e .) || fail "pbem or its C extension could not be built"
 }
 
+# Python reads what is compiled where it may not write it (PYTHONDONTWRITEBYTECODE, or a checkout of another user), and
+# otherwise compiles hundreds of modules at each start: a third of a small run.
+compile_modules() { "$venv/bin/python" -m compileall -q "$root/pbem" || say "modules are compiled at each start"; }
+
 # The kept packages must be the ones of the distribution: others are built with another MPI.
 check_origin() {
     refuse_strangers
@@ -182,7 +186,10 @@ main() {
     unset PYTHONHOME PYTHONPATH
     exec 9<"$root" && flock 9 # one set-up of this checkout at a time
     install_system_packages
-    is_up_to_date && return
+    if is_up_to_date; then
+        compile_modules
+        return
+    fi
     say "building $venv"
     make_venv
     rm -f "$stamp"
@@ -190,6 +197,7 @@ main() {
     pin_packages
     install_python_packages
     check_origin
+    compile_modules
     fingerprint >"$stamp"
     say "done: $venv/bin/pbem"
 }

@@ -115,16 +115,17 @@ def start(folder: Path, ranks: int, call: int) -> subprocess.Popen[str]:
 
 
 def list_ranks(session: int) -> list[int]:
-    """Processes of a session that run Python."""
-    found = []
+    """Processes of a session that run Python, without those that they have started themselves."""
+    found = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             name, fields = stat.read_text(errors="replace").split("(", 1)[1].rsplit(")", 1)
         except OSError:
             continue
-        if int(fields.split()[3]) == session and name.startswith("python"):
-            found.append(int(stat.parent.name))
-    return found
+        _, parent, _, own_session = fields.split()[:4]
+        if int(own_session) == session and name.startswith("python"):
+            found[int(stat.parent.name)] = int(parent)
+    return [process for process, parent in found.items() if parent not in found]
 
 
 def kill_once(folder: Path, ranks: int, chance: random.Random, seconds: float) -> tuple[bool, str]:

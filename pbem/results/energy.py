@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Complex, Integer, Real
 from pbem.contact.constraints import evaluate_fluid
 from pbem.contact.laws import PairLaws
 from pbem.geometry.tolerance import TIE
@@ -99,18 +99,20 @@ class EnergyBalance:
         before, from_rest = self._reached, self._last is None
         old, lost = self._enter_stage(step.stage)
         new, self._last = self._stored.describe(step), step
-        nodes = self._stored.outer.node
-        mean, change = 0.5 * (old.traction + new.traction), new.displacement - old.displacement
-        moved = change[nodes]
-        work = sum_work(self._stored.weight[nodes], mean[nodes], moved)
-        work -= sum_work(self._stored.tools, mean, change)
+        nodes, tools = self._stored.outer.node, self._stored.tools
+        moved = _move(old.displacement, new.displacement, nodes)
+        work = sum_work(self._stored.weight[nodes], _halve(old, new, nodes), moved)
+        pushed = np.flatnonzero(tools)
+        work -= sum_work(tools[pushed], _halve(old, new, pushed), _move(old.displacement, new.displacement, pushed))
         work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
         # What swells does work against the stress.
-        work -= sum_work(self._stored.weight, mean, new.swollen - old.swollen)
+        if any(new.swollen.strides) or any(old.swollen.strides):
+            swelling = new.swollen - old.swollen
+            work -= sum_work(self._stored.weight, 0.5 * (old.traction + new.traction), swelling)
         opened = None if self._stored.there is None else self._stored.there.opened
         pairs = measure_work(self.laws, self._stored.pair_weight, old.pairs, new.pairs, opened)
         fluid, bared = self._measure_bared(old, new)
-        fluid += pairs.fluid + self._press(0.5 * (old.pairs.pressure + new.pairs.pressure), change)
+        fluid += pairs.fluid + self._press(0.5 * (old.pairs.pressure + new.pairs.pressure), old, new)
         relieved = self._relieve(old, new) if from_rest else 0.0
         work += relieved
         # What springs take from the boundary they store, and what fluid does is work of its own.
@@ -180,13 +182,19 @@ class EnergyBalance:
         pressure, opened = new.pairs.pressure - old.pairs.pressure, new.pairs.g_n - old.pairs.g_n
         total += float(self._stored.pair_weight @ np.abs(pressure * opened))
         # Tools push where they touch; what swells works against the stress; what a stage releases is a load as well.
-        change, moved = new.traction - old.traction, new.displacement - old.displacement
-        total += abs(self._press(pressure, moved))
-        total += _add_sizes(self._stored.tools, change, moved)
-        total += _add_sizes(self._stored.weight, change, new.swollen - old.swollen)
+        total += abs(self._press(pressure, old, new))
+        tools = self._stored.tools
+        pushed = np.flatnonzero(tools)
+        change, moved = (_move(*each, pushed) for each in ((old.traction, new.traction),
+                                                           (old.displacement, new.displacement)))
+        total += _add_sizes(tools[pushed], change, moved)
+        if any(new.swollen.strides) or any(old.swollen.strides):
+            total += _add_sizes(self._stored.weight, new.traction - old.traction, new.swollen - old.swollen)
         if self._stored.there is not None:
             at = self._stored.there.bare
-            total += _add_sizes(self._stored.weight[at], change[at], moved[at])
+            change, moved = (_move(*each, at) for each in ((old.traction, new.traction),
+                                                           (old.displacement, new.displacement)))
+            total += _add_sizes(self._stored.weight[at], change, moved)
             fallen, slid = new.pairs.p_n - old.pairs.p_n, new.pairs.g_s - old.pairs.g_s
             work = np.abs(fallen * opened) + np.abs((new.pairs.p_s - old.pairs.p_s) * slid)
             total += float(self._stored.pair_weight @ np.where(self._stored.there.opening, work, 0.0))
@@ -199,7 +207,7 @@ class EnergyBalance:
         opened, slid = new.pairs.g_n - old.pairs.g_n, new.pairs.g_s - old.pairs.g_s
         return 0.5 * (on_faces + float(pairs @ (old.pairs.p_n * opened + old.pairs.p_s * slid)))
 
-    def _press(self, pressure: Real, moved: Complex) -> float:
+    def _press(self, pressure: Real, old: EnergyState, new: EnergyState) -> float:
         """What the fluid between different curves does as faces move besides what it does as pairs open; that on faces
         whose other side is gone is told apart."""
         there, mesh = self._stored.there, self._mesh
@@ -207,7 +215,7 @@ class EnergyBalance:
         if not len(at):
             return 0.0
         pushed = evaluate_fluid(mesh, pressure if there is None else np.where(there.bared, 0.0, pressure))
-        return sum_work(self._stored.weight[at], pushed[at], moved[at])
+        return sum_work(self._stored.weight[at], pushed[at], _move(old.displacement, new.displacement, at))
 
     def _measure_bared(self, old: EnergyState, new: EnergyState) -> tuple[float, float]:
         """On faces whose other side is gone: work of the fluid and of given tractions, and what those take that are
@@ -228,6 +236,16 @@ class EnergyBalance:
         moved = (new.displacement - old.displacement)[at]
         fluid = sum_work(self._stored.weight[at], pressed[at], moved)
         return fluid, fluid - sum_work(self._stored.weight[at], 0.5 * (old.traction + new.traction)[at], moved)
+
+
+def _move(old: Complex, new: Complex, at: Integer) -> Complex:
+    """By how much values (f,) change at some faces (k,)."""
+    return np.asarray(new[at] - old[at])
+
+
+def _halve(old: EnergyState, new: EnergyState, at: Integer) -> Complex:
+    """The mean tractions of a step at some faces (k,)."""
+    return np.asarray(0.5 * (old.traction[at] + new.traction[at]))
 
 
 def _add_sizes(weight: Real, traction: Complex, displacement: Complex) -> float:

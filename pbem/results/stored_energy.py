@@ -18,7 +18,7 @@ from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.at_rest import bear_in_situ
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_pressure, evaluate_walls
-from pbem.mesh.mesh import Faces, Mesh, list_faces
+from pbem.mesh.mesh import Faces, Mesh, list_faces, second_face_nodes
 from pbem.model.model import Model
 from pbem.results.dissipation import PairRecord, measure_stored, record_pairs, record_pairs_at_rest
 from pbem.results.face_weights import weigh_faces
@@ -39,28 +39,41 @@ _Fields = tuple[Complex, Complex, Real]
 
 
 class _Sides:
-    """All faces (f,) of a mesh, and those of its regions, listed when they are first asked for.
+    """All faces (f,) of a mesh, by region, some at a time: lists of all that they have take more than twice the room.
 
     Made anew for each step: all that the writer keeps is held on the first rank beside its share of the matrices.
     """
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
+        self._second = second_face_nodes(mesh)
 
     @cached_property
     def faces(self) -> Faces:
+        """With all that they have."""
         return list_faces(self._mesh)
+
+    @property
+    def region(self) -> Integer:
+        """Of each face (f,)."""
+        return np.concatenate([self._mesh.node_region, self._mesh.node_region[self._second]])
 
     @cached_property
     def _by_region(self) -> tuple[Integer, Integer]:
-        order = np.argsort(self.faces.region, kind="stable")
-        numbers = np.arange(len(self._mesh.region_names) + 1)
-        return order, np.searchsorted(self.faces.region[order], numbers)
+        region = self.region
+        order = np.argsort(region, kind="stable")
+        return order, np.searchsorted(region[order], np.arange(len(self._mesh.region_names) + 1))
 
     def find(self, region: int) -> Integer:
         """Those (k,) of a region."""
         order, bounds = self._by_region
         return order[bounds[region]:bounds[region + 1]]
+
+    def place(self, at: Integer) -> tuple[Complex, Complex]:
+        """Positions and normals (k,) of some faces."""
+        behind = at >= self._mesh.nodes
+        node = np.where(behind, self._second[np.where(behind, at - self._mesh.nodes, 0)], at) if behind.any() else at
+        return self._mesh.position[node], np.where(behind, -1, 1) * self._mesh.normal[node]
 
 
 @dataclass(frozen=True)
@@ -85,7 +98,8 @@ class _Reference:
         on_faces, own = np.zeros(len(self.fields)), sides.find(self.region)
         for begin in range(0, len(own), SUMMED):
             at = own[begin:begin + SUMMED]
-            z, n = sides.faces.position[at] - self.center, sides.faces.normal[at]
+            z, n = sides.place(at)
+            z = z - self.center
             w, t, u = weight[at], traction[at], displacement[at]
             for k, field in enumerate(self.fields):
                 on_faces[k] += (w * (t * np.conj(field.displacement(z)) - np.conj(field.traction(z, n)) * u)).real.sum()
@@ -142,7 +156,7 @@ class StoredEnergy:
             self._refer(sides, number, [ParticularSolution(each.material, remote=stress) for stress in UNIT_STRESSES])
             for number, each in enumerate(model.regions) if each.infinite
         ]  # fmt: skip
-        self._is_tool = np.array([each.rigid for each in model.regions])[sides.faces.region]
+        self._is_tool = np.array([each.rigid for each in model.regions])[sides.region]
         self._in_situ = self._sample_in_situ(sides)
         first = find_arrangement(model, mesh, self.outer, 0)
         self._pairs_at_rest = record_pairs_at_rest(
@@ -183,7 +197,7 @@ class StoredEnergy:
         self.there = find_arrangement(self._model, self._mesh, self.outer, stage)
         self.weight = self._all_weight
         if self.there is not None:
-            self.weight = np.where(self.there.regions[list_faces(self._mesh).region], 0.0, self._all_weight)
+            self.weight = np.where(self.there.regions[_Sides(self._mesh).region], 0.0, self._all_weight)
 
     def describe_rest(self) -> EnergyState:
         nothing = repeat_value(0.0, len(self.weight), complex)
@@ -200,10 +214,10 @@ class StoredEnergy:
         """The energy that is stored, and what weights and far stresses work on (theory, 73, 74)."""
         particulars, sides = evaluate_particular_solutions(self._model, stage, factor), _Sides(self._mesh)
         swollen = self._sample_swelling(sides, [balanced for balanced, _ in particulars])
-        strained = displacement - swollen  # by stress alone
+        strained = _subtract(displacement, swollen)  # by stress alone
         point_forces, moved = self._move_points(sides, traction, strained, stage, factor, particulars)
         works = [_Work(point_forces, moved, 0.5 * float(point_forces @ moved))]
-        fields, whole = (traction - self._in_situ, strained, point_forces), traction + self._in_situ
+        fields = (_subtract(traction, self._in_situ), strained, point_forces)
         works += [self._lift(sides, reference, particulars, fields) for reference in self._forces]
         works += [self._strain(sides, reference, particulars, fields) for reference in self._stresses]
         planes = [number for number, each in enumerate(self._model.regions) if each.infinite]
@@ -212,10 +226,18 @@ class StoredEnergy:
             traction, displacement, swollen,
             load=np.concatenate([each.load for each in works]),
             conjugate=np.concatenate([each.conjugate for each in works]),
-            stored=sum((each.stored for each in works), 0.5 * sum_work(self._elastic, whole, strained)),
+            stored=sum((each.stored for each in works), 0.5 * self._sum_elastic(traction, strained)),
             springs=0.5 * self._measure_springs(displacement, stage, factor), pairs=pairs,
             walls=evaluate_walls(self._model, self._mesh, stage, factor),
         )  # fmt: skip
+
+    def _sum_elastic(self, traction: Complex, displacement: Complex) -> float:
+        """What tractions and those of the in-situ stress (f,) do on displacements (f,) of what is elastic."""
+        total, weight = 0.0, self._elastic
+        for begin in range(0, len(weight), SUMMED):
+            at = slice(begin, begin + SUMMED)
+            total += sum_work(weight[at], traction[at] + self._in_situ[at], displacement[at])
+        return total
 
     def _move_points(
         self, sides: _Sides, traction: Complex, displacement: Complex, stage: int, factor: float,
@@ -281,7 +303,7 @@ class StoredEnergy:
             if at_rest.is_zero:
                 continue
             own, traction = sides.find(number), np.require(traction, requirements="W")
-            traction[own] = at_rest.traction(sides.faces.position[own], sides.faces.normal[own])
+            traction[own] = at_rest.traction(*sides.place(own))
         return traction
 
     def _sample_swelling(self, sides: _Sides, particulars: Sequence[ParticularSolution]) -> Complex:
@@ -291,7 +313,7 @@ class StoredEnergy:
         for number, balanced in enumerate(particulars):
             if not balanced.swelling.is_zero:
                 own, moved = sides.find(number), np.require(moved, requirements="W")
-                place, weight = sides.faces.position[own], self._all_weight[own]
+                place, weight = sides.place(own)[0], self._all_weight[own]
                 moved[own] = _take_back(place, balanced.swelling.displacement(place), weight)
         return moved
 
@@ -300,7 +322,7 @@ class StoredEnergy:
     ) -> _Reference:
         """Fields about the origin, or about a point `within` a finite region, where rounding is smallest."""
         faces = sides.find(region)
-        z, n = sides.faces.position[faces], sides.faces.normal[faces]
+        z, n = sides.place(faces)
         center = complex(z.mean()) if within else 0j
         z = z - center
         loads = list(self._model.point_loads.values())
@@ -317,7 +339,16 @@ class StoredEnergy:
 
 def sum_work(weight: Real, traction: Complex, displacement: Complex) -> float:
     """Tractions (f,) times displacements (f,), integrated by weights (f,)."""
-    return float(weight @ (traction * np.conj(displacement)).real)
+    total = 0.0
+    for begin in range(0, len(weight), SUMMED):
+        at = slice(begin, begin + SUMMED)
+        total += float(weight[at] @ (traction[at] * np.conj(displacement[at])).real)
+    return total
+
+
+def _subtract(values: Complex, part: Complex) -> Complex:
+    """The values without a part of them, in the same place where that is nothing."""
+    return values if not any(part.strides) and not part[:1].any() else values - part
 
 
 def _split(force: complex) -> Real:

@@ -54,7 +54,8 @@ def cut_network(traces: Mapping[str, Curve], snap: float = 0.0) -> Network:
     """Cut traces, open or closed, of straight and circular legs, wherever they cross or meet.
 
     snap: points no further from each other than this length are one, and what is no further from a trace is on it; at
-    least the rounding of the coordinates. Raises UnsettledError if it is so large that cuts bring ever more cuts.
+    least the rounding of the coordinates. Raises UnsettledError if it is so large that cuts bring ever more cuts,
+    or parts without a length.
     """
     if not traces:
         return Network({}, {}, (), (), ())

@@ -70,8 +70,16 @@ def cut_at_nodes(
             break
         fresh = [[False] * len(strand.legs) for strand in strands]
         if not _apply(strands, edges, points, cuts, fresh, rounding, log):
+            _refuse_nothing(strands)
             return points
     raise UnsettledError([complex(points[node]) for node in cuts[:, 1]])
+
+
+def _refuse_nothing(strands: list[Strand]) -> None:
+    """Raise UnsettledError for legs without a length: crossings that were kept apart are in one place."""
+    places = [leg.start for strand in strands for leg in strand.legs if leg.length == 0]
+    if places:
+        raise UnsettledError(places)
 
 
 def _collect(strands: list[Strand], fresh: list[list[bool]]) -> _Edges:

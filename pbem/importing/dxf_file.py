@@ -83,6 +83,8 @@ def _count_on_paper(drawing: Any) -> list[tuple[str, int]]:
 
 def _find_hidden(entity: Any, drawing: Any) -> str:
     """Why an entity is not seen in the drawing; empty if it is."""
+    if not entity.dxf.is_supported("layer"):
+        return ""  # of a kind that ezdxf does not know
     name = entity.dxf.get("layer", "0")
     layer = drawing.layers.get(name) if drawing.layers.has_entry(name) else None
     if layer is not None and layer.is_frozen():

@@ -513,6 +513,14 @@ def test_polylines_need_no_marks_of_their_class(capsys: Capture, version: str) -
     assert "Heights" in capsys.readouterr().out
 
 
+def test_entities_of_no_known_kind_are_left_out_and_told(capsys: Capture) -> None:
+    line = ["0", "LINE", "8", "0", "10", "0", "20", "0", "11", "1", "21", "1"]
+    tags = ["0", "SECTION", "2", "ENTITIES", *line, "0", "POL", "5", "FF", "0", "ENDSEC", "0", "EOF", ""]
+    Path("map.dxf").write_text("\n".join(tags))
+    assert main(["import", "map.dxf", "-o", "made.toml"]) == 0
+    assert "1 POL: only LINE" in capsys.readouterr().out
+
+
 def test_a_missing_library_is_named(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ezdxf", None)
     Path("map.dxf").write_text(write_dxf())

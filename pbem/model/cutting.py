@@ -16,6 +16,7 @@ from pbem.geometry.cusp import EXPECTED, touch_only
 from pbem.geometry.expression import list_names
 from pbem.geometry.junction import find_crossing_cracks, format_point
 from pbem.geometry.network import Change, Network, cut_network
+from pbem.geometry.network.noding import UnsettledError
 from pbem.model.roles import Roles
 from pbem.model.shaping import Shapes
 
@@ -49,11 +50,12 @@ def cut_cracks(case: Case, roles: Roles, shapes: Shapes) -> Cut:
         name: curve for name, curve in shapes.curves.items() if name in roles.cracks and name not in case.origin
     }
     crossing = find_crossing_cracks(own, shapes.tolerance)
-    networks = [
-        cut_network({name: own[name] for name in own if name in crossing and roles.cracks[name] == region},
-                    shapes.tolerance.largest)
-        for region in dict.fromkeys(roles.cracks[name] for name in crossing)
-    ]  # fmt: skip
+    crossed = [{name: own[name] for name in own if name in crossing and roles.cracks[name] == region}
+               for region in dict.fromkeys(roles.cracks[name] for name in crossing)]  # fmt: skip
+    try:
+        networks = [cut_network(cracks, shapes.tolerance.largest) for cracks in crossed]
+    except UnsettledError as error:
+        return Cut(case, roles, shapes, faults=_refuse_unsettled(error, shapes.tolerance.largest))
     if not networks:
         return Cut(case, roles, shapes)
     members = {trace: pieces for net in networks for trace, pieces in net.members.items()}
@@ -82,6 +84,12 @@ def cut_cracks(case: Case, roles: Roles, shapes: Shapes) -> Cut:
         case.put_pieces(members, tables), replace(roles, cracks=cracks),
         replace(shapes, curves=curves, tolerance=tolerance), notes,
     )
+
+
+def _refuse_unsettled(error: UnsettledError, tolerance: float) -> tuple[Fault, ...]:
+    places = dict.fromkeys(map(format_point, error.places[:MOST_NOTES]))
+    found = f"cracks too near to each other to be cut within a tolerance of {tolerance:.3g}, at {', '.join(places)}"
+    return (Fault.at(("curves",), found, "crossings and ends that are further from each other, or in one point"),)
 
 
 def _find_overlaps(network: Network, cracks: Mapping[str, Curve]) -> list[Fault]:

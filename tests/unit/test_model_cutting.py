@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pbem.geometry.network.noding import UnsettledError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.parts import find_parts
+from pbem.model import cutting
 from pbem.model.model import Model
 from tests.unit.case_sample import build, find_faults, find_only_fault
 
@@ -113,6 +115,15 @@ def test_faults_of_pieces_are_told_of_their_crack() -> None:
     assert "curve 'c'" in over and "running over curve" in over
     taken = find_only_fault(write({**CROSS, "a.1": "points = [[5, 0], [6, 0]], elements = 4"}))
     assert "a.1" in taken
+
+
+def test_cracks_that_cannot_be_cut_are_a_fault_with_the_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise UnsettledError([1 + 2j, 3 + 4j, 1 + 2j])
+
+    monkeypatch.setattr(cutting, "cut_network", fail)
+    told = find_only_fault(write(CROSS))
+    assert told.startswith("curves (line") and "too near to each other" in told and told.count("(1, 2), (3, 4)") == 1
 
 
 def test_cracks_that_cross_a_boundary_are_faults_still() -> None:

@@ -8,7 +8,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pbem.errors import Fault, PbemError
-from pbem.importing.msh_lines import LINES, POINT, SURFACES, BinaryLines, TextLines, count_nodes, read_integer
+from pbem.importing.msh_lines import (
+    LINES,
+    LONGEST_TITLE,
+    POINT,
+    SURFACES,
+    BinaryLines,
+    TextLines,
+    count_nodes,
+    read_integer,
+)
 from pbem.importing.reading import Reading, fail, read_text
 from pbem.wording import list_names
 
@@ -93,11 +102,13 @@ def read_mesh(path: Path) -> Grid:
         data = path.read_bytes()
     except OSError as error:
         raise PbemError(f"{path}: {error.strerror or error}") from None
-    return _read_grid(path, BinaryLines(data) if _is_binary(data[:200]) else TextLines(read_text(path)))
+    return _read_grid(path, BinaryLines(data) if _is_binary(data) else TextLines(read_text(path)))
 
 
-def _is_binary(head: bytes) -> bool:
-    words = head.split(b"$MeshFormat", 1)[-1].split()
+def _is_binary(data: bytes) -> bool:
+    """Whether the line of the format says so; comments of any length may precede it."""
+    at = max(data.find(b"$MeshFormat"), 0)
+    words = data[at:at + LONGEST_TITLE].partition(b"\n")[2].split()
     return len(words) > 1 and words[1] == b"1"
 
 

@@ -55,7 +55,7 @@ class StuckEnds:
     """
 
     def __init__(self, model: Model, mesh: Mesh, laws: PairLaws) -> None:
-        self._model, self._mesh, self._laws = model, mesh, laws
+        self._model, self._mesh = model, mesh
         apart = laws.bonded | laws.parted | laws.follows | find_creeping(laws) | (laws.tensile_strength > 0)
         apart |= (laws.compliance_n > 0) | (laws.compliance_s > 0)
         for group in laws.strengths:
@@ -63,6 +63,10 @@ class StuckEnds:
                 apart[group.pairs] = True
         ends = collect_ends(model, mesh)
         self._ends = _take(ends, ~(apart[ends.near] | apart[ends.beyond]))
+        # Of fields of cracks that meet nowhere, which have the most pairs, none are looked at, and nothing is kept.
+        self._laws = laws if len(self._ends.near) else None
+        if self._laws is None:
+            return
         self._interfaces = sort_pairs(mesh)
         element, weight = mesh.pairs.slave // (mesh.order + 1), mesh.pairs.weight
         self._element, self._length = element, np.bincount(element, weight, mesh.elements)
@@ -70,7 +74,9 @@ class StuckEnds:
     def bound(self, step: Step) -> Real:
         """The least errors (m, 2) of opening and slip, length: at the pair nearest to an end that would give way on
         finer meshes (theory, 138), elsewhere 0."""
-        contact, least = step.contact, np.zeros((self._laws.count, 2))
+        contact, least = step.contact, np.zeros((self._mesh.pairs.count, 2))
+        if self._laws is None:
+            return least
         ends = _take(self._ends, self._find_sticking(step)[self._ends.near])
         if not len(ends.near):
             return least
@@ -96,7 +102,7 @@ class StuckEnds:
     def _find_sticking(self, step: Step) -> Bool:
         """The pairs (m,) of interfaces that are there, with no other status."""
         contact, joints = step.contact, self._model.stages[step.stage].construction.joints
-        sticking = np.zeros(self._laws.count, dtype=bool)
+        sticking = np.zeros(self._mesh.pairs.count, dtype=bool)
         for name, own in self._interfaces.items():
             known = np.isfinite(contact.traction_n[own]).all() and np.isfinite(contact.slip[own]).all()
             sticking[own] = name not in joints and known and (contact.mode[own] == STICK).all()
@@ -164,6 +170,8 @@ def _list_ends(mesh: Mesh, chain: Integer, at_corner: Bool, touching: bool) -> l
     per_element, pairs = mesh.order + 1, mesh.pairs
     found: list[tuple[float, ...]] = []
     element = pairs.slave[chain] // per_element
+    if not touching and not at_corner[:, element].any():
+        return []
     border = np.flatnonzero(np.diff(element)) + 1
     firsts, lasts = np.concatenate([[0], border]), np.concatenate([border, [len(chain)]]) - 1
     own = element[firsts]

@@ -94,6 +94,13 @@ def test_binary_meshes_are_read_as_texts_are(version: str, capsys: Capture) -> N
     assert "Of the physical line 'ends' 2 elements have the name of 'left', 'right' instead." in said
 
 
+def test_comments_of_any_length_may_precede_a_binary_mesh(capsys: Capture) -> None:
+    data = b"$Comments\n" + 60 * b"made by hand\n" + b"$EndComments\n" + unpack("4.1")
+    Path("mesh.msh").write_bytes(data)
+    assert main(["import", "mesh.msh", "-o", "made.toml"]) == 0
+    assert len(tomllib.loads(Path("made.toml").read_text(encoding="utf-8"))["regions"]) == 2
+
+
 @pytest.mark.parametrize("version", PACKED)
 def test_binary_meshes_that_are_cut_short_are_refused_with_the_byte(version: str, capsys: Capture) -> None:
     data = unpack(version)

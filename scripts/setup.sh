@@ -173,7 +173,7 @@ install_python_packages() {
 
 # Python reads what is compiled where it may not write it (PYTHONDONTWRITEBYTECODE, or a checkout of another user), and
 # otherwise compiles hundreds of modules at each start: a third of a small run.
-compile_modules() { "$venv/bin/python" -m compileall -q "$root/pbem" || say "modules are compiled at each start"; }
+compile_modules() { "$venv/bin/python" -m compileall -qq "$root/pbem" || say "modules are compiled at each start"; }
 
 # The kept packages must be the ones of the distribution: others are built with another MPI.
 check_origin() {

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 import pbem
-from pbem.arrays import Complex
+from pbem.arrays import Complex, Real
 from pbem.bem.location import locate_points
 from pbem.case.build import parse_model
 from pbem.errors import ConvergenceError
@@ -193,3 +193,26 @@ analysis = { steps = 1 }
     results = run(text, tmp_path)
     assert list(results.contact) == ["c.1", "c.2", "d.1", "d.2"]
     assert len(results.balance.part_names) == 4 and results.balance.part_relative[-1].max() < 5e-3
+
+
+def test_slips_in_wide_wedges_converge_with_the_elements(tmp_path: Path) -> None:
+    """Of a triangle with a corner of 49.5 degrees, as cracks, against the same as a region with 64 on a side."""
+    ring = {"t": [0j, 3 + 0j, 2 * np.exp(1j * np.radians(49.5))]}
+
+    def find_slips(elements: int, regions: bool) -> list[tuple[Real, Real]]:
+        text = write_plane(ring, elements, regions=regions, law="friction = 0.4", remote=(-1.0, -4.0, 0.8))
+        contact = run(text, tmp_path).contact
+        return [(contact[name].arc_length, np.abs(contact[name].slip[-1])) for name in ("t0", "t1", "t2")]
+
+    right = find_slips(64, True)
+    largest = max(float(slip.max()) for _, slip in right)
+
+    def find_error(elements: int) -> float:
+        worst = 0.0
+        for (at, slip), (there, other) in zip(find_slips(elements, False), right, strict=True):
+            places = np.linspace(0.03, 0.97, 200) * there.max()
+            worst = max(worst, float(np.abs(np.interp(places, at, slip) - np.interp(places, there, other)).max()))
+        return worst / largest
+
+    coarse, fine = find_error(8), find_error(32)
+    assert fine < 3.5e-3 and fine < 0.6 * coarse

@@ -26,8 +26,8 @@ from pbem.contact.smoothed import (
 
 # Newton's steps of each width, and with the true laws, at most.
 MOST_STEPS, MOST_AT_END = 20, 30
-# Widths on the way to the last one, at most.
-MOST_WIDTHS = 16
+# Widths on the way to the last one, at most, those that were too narrow too.
+MOST_WIDTHS = 48
 # Of the way to a solution the whole is gone if that leaves BETTER of what pairs were off, in the mean, in which none
 # counts for more than FARTHEST widths; else the part that leaves least.
 PARTS = (1.0, 0.9, 0.75, 0.5, 0.3, 0.15, 0.05)
@@ -36,6 +36,9 @@ BETTER, FARTHEST = 0.9, 10.0
 NEAR, NEAR_ON_WAY = 0.1, 1.0
 # The first width, as a part of the largest violation of the true laws; the next ones, as a part of the one before.
 FIRST, NEXT = 0.1, 0.1
+# Where that leaves a pair off by more widths than LOST, the next one is wider: the root of that part, unless that is
+# SLOWEST already; after those that leave none so far off, parts are smaller again, by the power SOONER.
+LOST, SLOWEST, SOONER = 10.0, 0.8, 1.5
 # The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
 # where tangents cancel these, and so little that blocks hardly feel it (theory, 127). In clusters, whose systems are
 # small and solved in double precision, blocks that hardly anything drives come to rest with less.
@@ -98,15 +101,22 @@ class ClusterContact:
         None if there is none, or it is too far."""
         contact, proximal = self, PROXIMAL_ALONE * self.subset.laws.own_stiffness
         width = max(FIRST * float(self._find_violation(state, 0.0).max(initial=0.0)), last)
+        fall, reached = NEXT, np.inf
         for _ in range(MOST_WIDTHS):
             found = contact._approach(state, width * shape, proximal, NEAR_ON_WAY)
             if found is None:
                 return None
-            state = found[0]
+            if fall < SLOWEST and contact._measure_off(found[0], width * shape)[1] > LOST:
+                # What is too narrow for the first one is so by itself, later ones for the step that led to them.
+                fall = float(np.sqrt(fall))
+                width = fall * reached if reached < np.inf else width / NEXT
+                continue
+            state, reached = found[0], width
             if width <= last:
                 return state
             contact = ClusterContact(self.subset, self.smooth, self.stiffness, found[1], self.scale)
-            width = max(NEXT * width, last)
+            fall = max(fall**SOONER, NEXT)
+            width = max(fall * width, last)
         return None
 
     def end(self, state: PairState, judge: Judge) -> tuple[ModeState, PairState] | None:

@@ -114,6 +114,32 @@ def test_all_modes_occur_in_these() -> None:
     assert seen == {0, 1, 2} and len({OPEN, STICK, SLIP}) == 3
 
 
+def make_floating(seed: int, count: int) -> ClusterContact:
+    """Pairs around a block, with room for it, that hardly anything but they holds."""
+    contact, random = make_contact(seed, count, 1.0), np.random.default_rng(1000 + seed)
+    angle, motion = random.uniform(0, 2 * np.pi, count), np.zeros((2 * count, 3))
+    motion[0::2, 0], motion[0::2, 1] = np.cos(angle), np.sin(angle)
+    motion[1::2, 0], motion[1::2, 1], motion[1::2, 2] = -np.sin(angle), np.cos(angle), 1.0
+    basis = np.linalg.qr(motion)[0]
+    strained = np.eye(2 * count) - basis @ basis.T
+    stiffness = 3.0 * strained @ contact.stiffness @ strained - 1e-9 * np.eye(2 * count)
+    tractions = strained @ np.column_stack([contact.exact.p_n, contact.exact.p_s]).ravel()
+    exact = PairState(*tractions.reshape(-1, 2).T, random.uniform(0.02, 0.5, count), np.zeros(count))
+    return replace(contact, stiffness=stiffness, exact=exact)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 10])
+def test_widths_fall_more_slowly_where_blocks_are_lost(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Off by 2e7 widths and more where each is a tenth of the one before."""
+    contact, last = make_floating(seed, 10), np.full(10, 1e-8)
+    near = contact.narrow(contact.exact, np.ones(10), 1e-8)
+    assert near is not None and contact._measure_off(near, last)[1] <= cluster_laws.LOST
+    assert measure_imbalance(contact, near) < 1e-2
+    monkeypatch.setattr(cluster_laws, "SLOWEST", 0.0)
+    lost = contact.narrow(contact.exact, np.ones(10), 1e-8)
+    assert lost is None or contact._measure_off(lost, last)[1] > 1e6
+
+
 def test_what_has_no_solution_is_told() -> None:
     contact = make_contact(0, 3, 1.0)
     free = ClusterContact(contact.subset, contact.smooth, np.full((6, 6), np.nan), contact.exact, 1.0)

@@ -110,9 +110,7 @@ def test_a_small_block_is_taken_whole(many_groups: None, monkeypatch: pytest.Mon
     taken = np.unique(np.concatenate([each.elements for each in clusters.form(chosen)]))
     assert set(elements.tolist()) <= set(taken.tolist())
     # But for one that is too large.
-    monkeypatch.setattr(clusters_module, "MOST_ELEMENTS", len(elements) - 1)
-    _, fewer, _ = form_clusters(problem)
-    assert [len(each.elements) for each in fewer.form(chosen)] == [1]
+    assert [len(each.elements) for each in clusters.form(chosen, len(elements) - 1)] == [1]
     tangent.destroy()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pbem.contact.deferred_laws import defer_smoothed
+from pbem.contact.deferred_laws import defer_smoothed, free_jumps
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip, start_memory
 from pbem.contact.modes import Linearisation, linearise
 from pbem.contact.smoothed import (
@@ -35,6 +35,7 @@ from pbem.solve.nonlinear.smooth_search import (
     NEAR,
     PARTS,
     SmoothSearch,
+    Stage,
     Width,
 )
 from pbem.solve.problem.step import Iteration, SilentReporter
@@ -461,6 +462,37 @@ def test_the_last_width_stays_as_long_as_fewer_pairs_are_astray(
         assert not left and len(widths) == plain + stays
         for width in widths[len(widths) - stays :]:
             np.testing.assert_allclose(width, widths[-1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("settles", [True, False])
+def test_pairs_that_do_not_settle_are_led_back_in_larger_clusters(settles: bool) -> None:
+    problem = assemble(grow_branches(0, 6))
+    laws, count = problem.laws, problem.laws.count
+    memory, load = remember(0.0, count), problem.evaluate_load(0, 1.0)
+    search, width = SmoothSearch(problem, memory, load, True), 1e-3
+    own = width * search._shape
+    near = PairState(-own, np.zeros(count), own / laws.stiffness, memory.slip)
+    assert (search._find_violation(near, width) < 1e-6 * own).all()
+    thrown = np.zeros(count, dtype=bool)
+    thrown[[3, 4]] = True
+    state = near.choose(replace(near, p_n=-100 * own, g_n=100 * own / laws.stiffness), thrown)
+    constraints = problem.constrain(free_jumps(laws.leader, ~laws.follows, problem.traction_scale), load)
+    asked: list[tuple[NDArray[np.bool_], bool, int]] = []
+
+    class Clusters:
+        def solve(
+            self, chosen: NDArray[np.bool_], columns: int, solve: object, given: object = None, most: int = 0
+        ) -> tuple[Real, NDArray[np.bool_]]:
+            asked.append((chosen, given is constraints, most))
+            found = np.column_stack([near.p_n, near.p_s, near.g_n, near.g_s])
+            return found, chosen & (settles or given is not None)
+
+    now = Stage(state, near, width, constraints)
+    found, off = search._settle_clusters(Clusters(), state, now, 1.0)  # type: ignore[arg-type]
+    expected = [(False, 0)] if settles else [(False, 0), (True, smooth_search.MORE_ELEMENTS)]
+    assert [each[1:] for each in asked] == expected
+    assert all((chosen == thrown).all() for chosen, *_ in asked)
+    assert off < 1e-6 and (found.g_n == near.g_n).all()
 
 
 def test_pairs_that_are_off_are_counted_by_their_own_widths() -> None:

@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pbem.arrays import Integer, Real
-from pbem.contact.cluster_laws import FARTHEST, PROXIMAL
-from pbem.contact.constraints import evaluate_pairs
+from pbem.arrays import Bool, Integer, Real
+from pbem.contact.cluster_laws import FARTHEST, LOST, PROXIMAL, ClusterContact
+from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.deferred_laws import defer_smoothed
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
@@ -67,6 +67,9 @@ NEAR, BETTER = 0.3, 0.9
 # Between iterations pairs that are off by more than so many widths settle in clusters by themselves, unless they are
 # more than this part of all.
 OFF, MOST_OFF = 1.0, 0.3
+# Those that are off by more than LOST widths then, no more than so many, are led back from where they were before, in
+# clusters of so many elements.
+MOST_LOST, MORE_ELEMENTS = 500, 240
 # Pairs that are shorter than the mean have larger widths, by the root of how much shorter they are, up to so much.
 MOST_WIDENED = 1e3
 # It ends after so many iterations, or one with the last width in which no more than this part of all pairs, or so many,
@@ -78,7 +81,7 @@ LONGEST, FEW, FEWEST = 40, 1e-2, 10
 SETTLED, ASTRAY = 0.01, 100
 # The part of the residual that is left, as blocks that are nearly free move by far more than it tells, and later ones,
 # in which they are freer, do not move them back; and in the iterations with the true laws that follow.
-CLOSELY = 1e-6
+CLOSELY = 1e-8
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,17 @@ class SmoothCourse:
     width: Width
     exact: PairState | None = None
     astray: int | None = None
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What an iteration has led to: a state of all pairs that the equations hold of, the one before, the width that
+    belongs here, and the constraints of its solution."""
+
+    exact: PairState
+    former: PairState
+    width: float
+    constraints: ConstraintMap
 
 
 class SmoothSearch:
@@ -225,10 +239,11 @@ class SmoothSearch:
             whole = evaluate_pairs(problem.mesh, law, solved.unknowns)
             found = take_off_proximal(problem.laws, self.smooth, whole, state, proximal)
             part, off = problem.decide(lambda now=state, new=found, at=width: self._choose_part(now, new, at))  # type: ignore[misc]
-            before, state, exact = modes, state.approach(found, part), exact.approach(whole, part)
-            left = off
+            before, former = modes, state
+            state, exact, left = state.approach(found, part), exact.approach(whole, part), off
             if clusters is not None:
-                state, off = self._settle_clusters(clusters, state, exact, width.fall(part), off)
+                now = Stage(exact, former, width.fall(part), constraints)
+                state, off = self._settle_clusters(clusters, state, now, off)
                 tangent.expect(stack_states(state))
             modes = problem.decide(lambda at=state: (  # type: ignore[misc]
                 read_modes(problem.laws, self.smooth, at, memory, load.pressure)))
@@ -245,26 +260,42 @@ class SmoothSearch:
         return modes, state
 
     def _settle_clusters(
-        self, clusters: PairClusters, state: PairState, exact: PairState, width: float, off: float
+        self, clusters: PairClusters, state: PairState, now: Stage, off: float
     ) -> tuple[PairState, float]:
         """The state, with pairs that are off their smoothed laws settled in clusters; and how much pairs are off then.
 
-        exact: a state that the equations hold of. off: how much pairs were off.
+        off: how much pairs were off. Blocks that the solution throws far off their seats do not find back from where
+        they are: they settle from where they were before, by ever smaller widths, in larger clusters that what is
+        beyond follows.
         """
-        problem, widths = self._problem, width * self._shape
-        far = problem.decide(lambda: self._find_violation(state, width) > OFF * widths)
-        if not 0 < np.count_nonzero(far) <= MOST_OFF * len(far):
-            return state, off
+        problem, widths = self._problem, now.width * self._shape
 
-        def settle(pairs: Integer, stiffness: Real) -> Real | None:
-            contact = take_cluster(problem, self._memory, self._load, self.smooth, exact, pairs, stiffness)
-            own = PROXIMAL * problem.laws.own_stiffness[pairs]
-            found = contact.settle_smoothed(state.take(pairs), widths[pairs], own)
+        def find_far(most: float) -> Bool:
+            return problem.decide(lambda: self._find_violation(state, now.width) > most * widths)
+
+        def take(pairs: Integer, stiffness: Real) -> ClusterContact:
+            return take_cluster(problem, self._memory, self._load, self.smooth, now.exact, pairs, stiffness)
+
+        def settle(pairs: Integer, contact: ClusterContact, at: PairState) -> Real | None:
+            found = contact.settle_smoothed(at, widths[pairs], PROXIMAL * problem.laws.own_stiffness[pairs])
             return None if found is None else stack_states(found)
 
-        values, settled = clusters.solve(far, 4, settle)
+        def lead_back(pairs: Integer, stiffness: Real) -> Real | None:
+            contact = take(pairs, stiffness)
+            near = contact.narrow(now.former.take(pairs), self._shape[pairs], now.width)
+            return None if near is None else settle(pairs, contact, near)
+
+        far = find_far(OFF)
+        if not 0 < np.count_nonzero(far) <= MOST_OFF * len(far):
+            return state, off
+        values, settled = clusters.solve(
+            far, 4, lambda pairs, stiffness: settle(pairs, take(pairs, stiffness), state.take(pairs)))
         state = state.choose(PairState(*values.T), settled)
-        return state, problem.decide(lambda: self._measure_off(state, width))
+        lost = find_far(LOST)
+        if 0 < np.count_nonzero(lost) <= MOST_LOST:
+            values, settled = clusters.solve(lost, 4, lead_back, now.constraints, MORE_ELEMENTS)
+            state = state.choose(PairState(*values.T), settled)
+        return state, problem.decide(lambda: self._measure_off(state, now.width))
 
     def _count_astray(self, state: PairState, width: float) -> int:
         return self._problem.decide(lambda: int(np.count_nonzero(

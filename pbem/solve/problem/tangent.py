@@ -61,12 +61,13 @@ class PairClusters(Protocol):
     """Clusters of neighbouring pairs that are solved for by themselves; all ranks call them together."""
 
     def solve(
-        self, chosen: Bool, columns: int, solve: SolveCluster, constraints: ConstraintMap | None = None
+        self, chosen: Bool, columns: int, solve: SolveCluster, constraints: ConstraintMap | None = None,
+        most: int = ...,
     ) -> tuple[Real, Bool]:
         """What clusters around the chosen pairs (m,) lead to: values (m, columns), and which pairs (m,) have some.
 
         Pairs that follow others have their leaders'. constraints: of the last solution, by which the pairs beyond a
-        cluster follow it where clusters are few; without, they stay as they are.
+        cluster follow it where clusters are few; without, they stay as they are. most: elements of a cluster.
         """
 
 

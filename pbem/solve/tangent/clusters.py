@@ -35,7 +35,7 @@ from pbem.solve.tangent.sweeps import find_pairs, find_softness, halve_elements,
 NEIGHBOURS = 16
 # Elements of a cluster at most, and of a block that is taken whole; what a cluster takes grows with the third power.
 MOST_ELEMENTS = 80
-# Elements around a cluster, as a multiple of its own, and at least.
+# Elements around a cluster, as a multiple of its own, and at least; no more than MOST_ELEMENTS.
 AROUND, LEAST_AROUND = 1.0, 32
 # Up to so many clusters are solved for with the elements beyond each, in all so many unknowns, which follow in the
 # modes that they have. What is left at the end are contacts that a crack slides along, or a block turns on: their
@@ -72,21 +72,22 @@ class Clusters:
         self._middle, self._tree = middle, cKDTree(np.column_stack([middle.real, middle.imag]))
         around = (np.unique(self._element[problem.cut.find_around(body)[0]])
                   for body in np.flatnonzero(problem.parts.block))
-        self._blocks = [each for each in around if len(each) <= MOST_ELEMENTS]
+        self._blocks = list(around)
         self._blocks_of: dict[int, list[int]] = {}
         for number, block in enumerate(self._blocks):
             for element in block.tolist():
                 self._blocks_of.setdefault(element, []).append(number)
 
     def solve(
-        self, chosen: Bool, columns: int, solve: SolveCluster, constraints: ConstraintMap | None = None
+        self, chosen: Bool, columns: int, solve: SolveCluster, constraints: ConstraintMap | None = None,
+        most: int = MOST_ELEMENTS,
     ) -> tuple[Real, Bool]:
         """See PairClusters; each rank for some of the clusters."""
         problem, comm = self._problem, self._problem.comm
-        formed = self.form(chosen)
+        formed = self.form(chosen, most)
         found = np.zeros((len(chosen), columns + 1))
         with clock.piece("clusters"):
-            beyond = next((number for most, number in FOLLOWING if len(formed) <= most), 0)
+            beyond = next((number for few, number in FOLLOWING if len(formed) <= few), 0)
             own = self._list_stiffness(formed[comm.rank :: comm.size], constraints if beyond else None, beyond)
             for _ in range(0, len(formed), comm.size):
                 for each, stiffness in islice(own, 1):  # none on the last ranks in the last round
@@ -97,14 +98,15 @@ class Clusters:
         found = add_up(comm, found)[problem.laws.leader]
         return found[:, :-1], found[:, -1] > 0
 
-    def form(self, chosen: Bool) -> list[Cluster]:
-        """Clusters around the chosen pairs (m,), the largest ones first."""
+    def form(self, chosen: Bool, most: int = MOST_ELEMENTS) -> list[Cluster]:
+        """Clusters around the chosen pairs (m,), of so many elements at most and those around, the largest first."""
         mesh, laws = self._problem.mesh, self._problem.laws
         elements = np.unique(self._element[laws.leader[chosen]])
-        sets = [part for own in self._join(self._link(elements))
-                for part in halve_elements(self._middle, own, MOST_ELEMENTS)]
-        whole = [np.union1d(own, find_nearest(mesh, own, self._tree, max(LEAST_AROUND, int(AROUND * len(own)))))
-                 for own in sets]
+        sets = [part for own in self._join(self._link(elements), most)
+                for part in halve_elements(self._middle, own, most)]
+        around = [min(max(LEAST_AROUND, int(AROUND * len(own))), MOST_ELEMENTS) for own in sets]
+        whole = [np.union1d(own, find_nearest(mesh, own, self._tree, number))
+                 for own, number in zip(sets, around, strict=True)]
         order = np.argsort([-len(each) for each in whole], kind="stable")
         # A pair around several clusters takes its values from the first of them, but from its own if it is in one.
         owner = np.full(mesh.pairs.count, -1)
@@ -125,20 +127,20 @@ class Clusters:
         return _connect([np.append(each, own) for each, own in zip(near.reshape(len(at), -1), elements, strict=True)],
                         [elements[k : k + 1] for k in range(len(elements))], count)
 
-    def _join(self, sets: list[Integer]) -> list[Integer]:
+    def _join(self, sets: list[Integer], most: int) -> list[Integer]:
         """The sets with all of the blocks that they touch, the smallest first, as many as are not too much; those that
-        then have elements in common as one, if that is not too much."""
+        then have elements in common as one, if that is not too much: of so many elements at most."""
         wider = []
         for own in sets:
             touched = {number for element in own.tolist() for number in self._blocks_of.get(element, ())}
             for number in sorted(touched, key=lambda number: (len(self._blocks[number]), number)):
                 whole = np.union1d(own, self._blocks[number])
-                own = whole if len(whole) <= MOST_ELEMENTS else own
+                own = whole if len(whole) <= most else own
             wider.append(own)
         result = []
         for numbers in _connect(wider, [np.array([k]) for k in range(len(wider))], self._problem.mesh.elements):
             whole = np.unique(np.concatenate([wider[k] for k in numbers]))
-            result += [whole] if len(whole) <= MOST_ELEMENTS else [wider[k] for k in numbers]
+            result += [whole] if len(whole) <= most else [wider[k] for k in numbers]
         return result
 
     def _list_stiffness(

@@ -61,8 +61,8 @@ LINEAR_FOLD, LEAST_GROWTH = 4, 0.06
 # wedges of up to 48, 31 and less than 20 degrees the compliance of pairs there had the wrong sign. Where a crack turns
 # the last one holds for all orders: K of a wing of linear elements at 34 degrees was 0.57 % off (0.5 at most without).
 TIED = (50.0 * (1 - TIE), 35.0 * (1 - TIE), 25.0 * (1 - TIE))
-# Elements that are asked for from the corner on, in the mean of the legs, up to which the last bit is as it is. For more
-# it is shorter by the power of legs that are graded by powers: else slips would not converge with the elements.
+# Elements that are asked for from the corner on, in the mean of the legs, up to which the last bit is as it is. With
+# more it is shorter, by the power of legs that are graded by powers: else slips would not converge with the elements.
 ENOUGH = 4
 # Most growth of lengths per distance from the corner, for wedges that are not very narrow.
 MOST_GROWTH = 1.0

@@ -55,6 +55,8 @@ _AT_FIRST_USE = {
 
 
 def __getattr__(name: str) -> Any:
+    if name == "errors":  # the module, which `pbem.errors.CaseError` asks for
+        return import_module("pbem.errors")
     if name not in _AT_FIRST_USE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from pbem.loading import load_at_once

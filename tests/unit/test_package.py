@@ -84,3 +84,8 @@ def test_a_source_package_has_all_that_the_kernels_and_commands_need(tmp_path: P
               "cases/*.toml") for path in made.glob(pattern)}  # fmt: skip
     assert len(needed) > 200
     assert sorted(needed - packed) == []
+
+
+def test_errors_are_found_by_their_module_too() -> None:
+    code = "import pbem; assert pbem.errors.CaseError is pbem.CaseError"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -62,7 +62,8 @@ LINEAR_FOLD, LEAST_GROWTH = 4, 0.06
 # the last one holds for all orders: K of a wing of linear elements at 34 degrees was 0.57 % off (0.5 at most without).
 TIED = (50.0 * (1 - TIE), 35.0 * (1 - TIE), 25.0 * (1 - TIE))
 # Elements that are asked for from the corner on, in the mean of the legs, up to which the last bit is as it is. With
-# more it is shorter, by the power of legs that are graded by powers: else slips would not converge with the elements.
+# more it is shorter where it is not tied, by the power of legs that are graded by powers: else slips would not converge
+# with the elements.
 ENOUGH = 4
 # Most growth of lengths per distance from the corner, for wedges that are not very narrow.
 MOST_GROWTH = 1.0
@@ -196,14 +197,15 @@ def find_wedges(
         corners.append(replace(corner, branching=branching, turning=turning))
         shortest = min(legs[number].length for number, _ in ends)
         bit = measure_last_bit(corner.angle, branching or turning) * shortest
-        if not (branching or turning):
+        tied = math.degrees(corner.angle) < (TIED[-1] if turning else TIED[min(order, 2)])
+        if not (branching or turning or tied):
             bit *= min(1.0, (ENOUGH / asked) ** 3)
         if turning and corner.angle < SHARPER:
             bit *= SHARPER_BIT
         if ending:
             bit = min(bit, corner.last_bit * min(lengths))
         bits.append(bit)
-        if math.degrees(corner.angle) >= (TIED[-1] if turning else TIED[min(order, 2)]):
+        if not tied:
             continue
         for number, at_end in corner.ends:
             first = before[number] + (legs[number].length - bit if at_end else 0.0)

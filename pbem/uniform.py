@@ -15,6 +15,11 @@ def repeat_value(value: Any, shape: int | tuple[int, ...], dtype: DTypeLike = fl
     return np.broadcast_to(np.asarray(value, dtype=dtype), shape)
 
 
+def is_nothing(values: NDArray[Any]) -> bool:
+    """Whether values are a single zero that stands for all of them, as repeat_value makes it."""
+    return not any(values.strides) and not np.any(values[:1])
+
+
 def fold_uniform(values: NDArray[Scalar]) -> NDArray[Scalar]:
     """The same values; where all are alike, to the bit, in an array that takes no room and cannot be written to."""
     if values.size < 2:

@@ -40,6 +40,7 @@ from pbem.results.dissipation import PairWork, measure_work
 from pbem.results.runaway import Runaway
 from pbem.results.stored_energy import EnergyState, StoredEnergy, sum_work
 from pbem.solve.problem.step import Step
+from pbem.uniform import is_nothing
 
 # A step within which faces ran away released at least this part of the energy that was stored.
 LEAST_RELEASED = 0.01
@@ -106,7 +107,7 @@ class EnergyBalance:
         work -= sum_work(tools[pushed], _halve(old, new, pushed), _move(old.displacement, new.displacement, pushed))
         work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
         # What swells does work against the stress.
-        if any(new.swollen.strides) or any(old.swollen.strides):
+        if not (is_nothing(new.swollen) and is_nothing(old.swollen)):
             swelling = new.swollen - old.swollen
             work -= sum_work(self._stored.weight, 0.5 * (old.traction + new.traction), swelling)
         opened = None if self._stored.there is None else self._stored.there.opened
@@ -188,7 +189,7 @@ class EnergyBalance:
         change, moved = (_move(*each, pushed) for each in ((old.traction, new.traction),
                                                            (old.displacement, new.displacement)))
         total += _add_sizes(tools[pushed], change, moved)
-        if any(new.swollen.strides) or any(old.swollen.strides):
+        if not (is_nothing(new.swollen) and is_nothing(old.swollen)):
             total += _add_sizes(self._stored.weight, new.traction - old.traction, new.swollen - old.swollen)
         if self._stored.there is not None:
             at = self._stored.there.bare

@@ -25,7 +25,7 @@ from pbem.results.face_weights import weigh_faces
 from pbem.results.point_work import evaluate_unit_motions, measure_point_forces, measure_point_motions
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import Step
-from pbem.uniform import fold_uniform, repeat_value
+from pbem.uniform import fold_uniform, is_nothing, repeat_value
 
 UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Faces whose work is summed up at a time.
@@ -348,7 +348,7 @@ def sum_work(weight: Real, traction: Complex, displacement: Complex) -> float:
 
 def _subtract(values: Complex, part: Complex) -> Complex:
     """The values without a part of them, in the same place where that is nothing."""
-    return values if not any(part.strides) and not part[:1].any() else values - part
+    return values if is_nothing(part) else values - part
 
 
 def _split(force: complex) -> Real:

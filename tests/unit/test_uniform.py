@@ -13,7 +13,7 @@ from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import list_faces
 from pbem.results.energy import EnergyBalance
-from pbem.uniform import fold_uniform, repeat_value
+from pbem.uniform import fold_uniform, is_nothing, repeat_value
 from tests.unit.case_sample import build
 
 FIELD = """
@@ -102,3 +102,8 @@ def test_the_energy_balance_stores_no_fields_of_its_own() -> None:
     assert now < 45 * count
     assert most < 400 * count
     assert balance.laws.count == mesh.pairs.count
+
+
+def test_nothing_is_a_zero_that_stands_for_all() -> None:
+    assert is_nothing(repeat_value(0.0, 5, complex))
+    assert not is_nothing(repeat_value(1e-300, 5)) and not is_nothing(np.zeros(5))

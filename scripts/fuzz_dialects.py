@@ -1,6 +1,6 @@
 """Seeded maps in the dress of other programs: `pbem import` reads the same traces in all, or says with a place why not.
 
-    python scripts/fuzz_dialects.py [--count N] [--seed S] [--keep FOLDER] [--seconds 20]
+    python -m scripts.fuzz_dialects [--count N] [--seed S] [--keep FOLDER] [--seconds 20]
 
 Each map is imported from plain GeoJSON and from a file as other programs write it: systems of coordinates, nested and
 empty geometries, heights, odd names, tables with other delimiters, decimal commas, quotes, marks of byte order, further
@@ -12,17 +12,13 @@ code is 1 if anything did.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
 import json
 import math
 import random
 import sys
-import tempfile
-import time
 import tomllib
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +27,7 @@ from typing import Any
 import ezdxf
 from ezdxf import units
 
-from scripts.fuzz_import import Line, call, draw_map
+from scripts.fuzz_import import Line, call, draw_map, run_seeds
 
 NAMES = ("Störung {}", "断层{}", "f-{}", "F {} (mapped)", "{}", "a'b\"{}", "#{}", "[{}]", "x={}", "fault.{}",
          "∂{}\u200b", "{}.5", "a\\{}", "t{}*", "..{}", "ü" * 300 + "{}")
@@ -261,30 +257,5 @@ def try_dressed(seed: int, folder: Path) -> tuple[str, str]:
     return ("accepted" if code == 0 and "Traceback" not in checked else "wrong"), f"{said}\n{checked}"
 
 
-def main() -> int:
-    """Run them."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=500)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--keep", metavar="FOLDER", help="where the files go")
-    parser.add_argument("--seconds", type=float, default=20.0, help="that one may take")
-    options = parser.parse_args()
-    counts: Counter[str] = Counter()
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(options.keep or temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        for seed in range(options.seed, options.seed + options.count):
-            begin = time.process_time()
-            end, said = try_dressed(seed, folder)
-            took = time.process_time() - begin
-            if took > options.seconds:
-                end, said = "wrong", f"{said}\n{took:.0f} s"
-            counts[end] += 1
-            if end == "wrong":
-                print(f"--- seed {seed}: {make_dressed(seed)[1].what}\n{said[-1200:]}", flush=True)
-    print(dict(counts))
-    return 1 if counts["wrong"] else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_seeds(__doc__, try_dressed, lambda seed: make_dressed(seed)[1].what))

@@ -1,6 +1,6 @@
 """Seeded mutants of maps and meshes: `pbem import` gives a case that `pbem check` accepts, or a message with a place.
 
-    python scripts/fuzz_import.py [--count N] [--seed S] [--keep FOLDER]
+    python scripts/fuzz_import.py [--count N] [--seed S] [--keep FOLDER] [--seconds 20]
 
 Prints what went wrong and the counts of both ends; the exit code is 1 if anything did.
 """
@@ -17,6 +17,7 @@ import math
 import random
 import sys
 import tempfile
+import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -318,25 +319,40 @@ def try_mutant(seed: int, folder: Path) -> tuple[str, str]:
     return ("accepted" if right else "wrong"), f"{said}\n{checked}"
 
 
-def main() -> int:
-    """Run the mutants."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def run_seeds(
+    description: str | None, try_seed: Callable[[int, Path], tuple[str, str]], name_seed: Callable[[int], str]
+) -> int:
+    """Try the seeds that the command line asks for, and print what was wrong; returns the exit code.
+
+    try_seed: "accepted", "refused" or "wrong", and what was said; name_seed: what the file of a seed is.
+    """
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=500)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", metavar="FOLDER", help="where the files go")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of the processor that one may take")
     options = parser.parse_args()
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(options.keep or temporary)
         folder.mkdir(parents=True, exist_ok=True)
         for seed in range(options.seed, options.seed + options.count):
-            end, said = try_mutant(seed, folder)
+            begin = time.process_time()
+            end, said = try_seed(seed, folder)
+            took = time.process_time() - begin
+            if took > options.seconds:
+                end, said = "wrong", f"{said}\n{took:.0f} s"
             counts[end] += 1
             if end == "wrong":
-                print(f"--- seed {seed}: {make_mutant(seed)[0]} {' '.join(make_mutant(seed)[2])}\n{said[-1500:]}")
+                print(f"--- seed {seed}: {name_seed(seed)}\n{said[-1500:]}", flush=True)
     print(dict(counts))
     return 1 if counts["wrong"] else 0
 
 
+def _name_mutant(seed: int) -> str:
+    kind, _, options = make_mutant(seed)
+    return " ".join([kind, *options])
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_seeds(__doc__, try_mutant, _name_mutant))

@@ -119,6 +119,20 @@ class ClusterContact:
             width = max(fall * width, last)
         return None
 
+    def lead_back(
+        self, state: PairState, former: PairState, shape: Real, width: float, proximal: Real
+    ) -> PairState | None:
+        """The state near to the smoothed laws of a width > 0, times shape (k,), that ever smaller ones lead to from a
+        former state; None if there is none, or it is further off them than the state that there is.
+
+        proximal: see settle_smoothed.
+        """
+        near = self.narrow(former, shape, width)
+        found = None if near is None else self.settle_smoothed(near, width * shape, proximal)
+        if found is None or not self._measure_off(found, width * shape)[0] < self._measure_off(state, width * shape)[0]:
+            return None
+        return found
+
     def end(self, state: PairState, judge: Judge) -> tuple[ModeState, PairState] | None:
         """The modes that the judge leaves as they are, and their state, by Newton's steps with the true laws from those
         of a state near to smoothed ones; None if they do not come to that."""

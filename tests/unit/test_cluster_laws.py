@@ -140,6 +140,15 @@ def test_widths_fall_more_slowly_where_blocks_are_lost(seed: int, monkeypatch: p
     assert lost is None or contact._measure_off(lost, last)[1] > 1e6
 
 
+def test_what_is_led_back_is_nearer_than_what_there_is() -> None:
+    contact = make_floating(1, 10)
+    shape, proximal = np.ones(10), 1e-5 * contact.subset.laws.own_stiffness
+    thrown = replace(contact.exact, p_n=contact.exact.p_n - 1.0)
+    found = contact.lead_back(thrown, contact.exact, shape, 1e-6, proximal)
+    assert found is not None and contact._measure_off(found, 1e-6 * shape)[1] <= cluster_laws.LOST
+    assert contact.lead_back(found, contact.exact, shape, 1e-6, proximal) is None
+
+
 def test_what_has_no_solution_is_told() -> None:
     contact = make_contact(0, 3, 1.0)
     free = ClusterContact(contact.subset, contact.smooth, np.full((6, 6), np.nan), contact.exact, 1.0)

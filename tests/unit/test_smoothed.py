@@ -34,8 +34,8 @@ from pbem.solve.nonlinear.smooth_search import (
     NARROWEST,
     NEAR,
     PARTS,
+    Reached,
     SmoothSearch,
-    Stage,
     Width,
 )
 from pbem.solve.problem.step import Iteration, SilentReporter
@@ -487,7 +487,7 @@ def test_pairs_that_do_not_settle_are_led_back_in_larger_clusters(settles: bool)
             found = np.column_stack([near.p_n, near.p_s, near.g_n, near.g_s])
             return found, chosen & (settles or given is not None)
 
-    now = Stage(state, near, width, constraints)
+    now = Reached(state, near, width, constraints)
     found, off = search._settle_clusters(Clusters(), state, now, 1.0)  # type: ignore[arg-type]
     expected = [(False, 0)] if settles else [(False, 0), (True, smooth_search.MORE_ELEMENTS)]
     assert [each[1:] for each in asked] == expected

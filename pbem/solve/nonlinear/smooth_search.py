@@ -127,7 +127,7 @@ class SmoothCourse:
 
 
 @dataclass(frozen=True)
-class Stage:
+class Reached:
     """What an iteration has led to: a state of all pairs that the equations hold of, the one before, the width that
     belongs here, and the constraints of its solution."""
 
@@ -242,7 +242,7 @@ class SmoothSearch:
             before, former = modes, state
             state, exact, left = state.approach(found, part), exact.approach(whole, part), off
             if clusters is not None:
-                now = Stage(exact, former, width.fall(part), constraints)
+                now = Reached(exact, former, width.fall(part), constraints)
                 state, off = self._settle_clusters(clusters, state, now, off)
                 tangent.expect(stack_states(state))
             modes = problem.decide(lambda at=state: (  # type: ignore[misc]
@@ -260,7 +260,7 @@ class SmoothSearch:
         return modes, state
 
     def _settle_clusters(
-        self, clusters: PairClusters, state: PairState, now: Stage, off: float
+        self, clusters: PairClusters, state: PairState, now: Reached, off: float
     ) -> tuple[PairState, float]:
         """The state, with pairs that are off their smoothed laws settled in clusters; and how much pairs are off then.
 
@@ -268,28 +268,29 @@ class SmoothSearch:
         they are: they settle from where they were before, by ever smaller widths, in larger clusters that what is
         beyond follows.
         """
-        problem, widths = self._problem, now.width * self._shape
+        problem, shape = self._problem, self._shape
+        proximal = PROXIMAL * problem.laws.own_stiffness
 
         def find_far(most: float) -> Bool:
-            return problem.decide(lambda: self._find_violation(state, now.width) > most * widths)
+            return problem.decide(lambda: self._find_violation(state, now.width) > most * now.width * shape)
 
         def take(pairs: Integer, stiffness: Real) -> ClusterContact:
             return take_cluster(problem, self._memory, self._load, self.smooth, now.exact, pairs, stiffness)
 
-        def settle(pairs: Integer, contact: ClusterContact, at: PairState) -> Real | None:
-            found = contact.settle_smoothed(at, widths[pairs], PROXIMAL * problem.laws.own_stiffness[pairs])
+        def settle(pairs: Integer, stiffness: Real) -> Real | None:
+            found = take(pairs, stiffness).settle_smoothed(
+                state.take(pairs), now.width * shape[pairs], proximal[pairs])
             return None if found is None else stack_states(found)
 
         def lead_back(pairs: Integer, stiffness: Real) -> Real | None:
-            contact = take(pairs, stiffness)
-            near = contact.narrow(now.former.take(pairs), self._shape[pairs], now.width)
-            return None if near is None else settle(pairs, contact, near)
+            found = take(pairs, stiffness).lead_back(
+                state.take(pairs), now.former.take(pairs), shape[pairs], now.width, proximal[pairs])
+            return None if found is None else stack_states(found)
 
         far = find_far(OFF)
         if not 0 < np.count_nonzero(far) <= MOST_OFF * len(far):
             return state, off
-        values, settled = clusters.solve(
-            far, 4, lambda pairs, stiffness: settle(pairs, take(pairs, stiffness), state.take(pairs)))
+        values, settled = clusters.solve(far, 4, settle)
         state = state.choose(PairState(*values.T), settled)
         lost = find_far(LOST)
         if 0 < np.count_nonzero(lost) <= MOST_LOST:

@@ -295,8 +295,8 @@ class SolverTable(Table):
 
     linear: Literal["auto", "lu", "mumps", "gmres"] = Field(
         "auto",
-        description='`"lu"`: dense; `"mumps"`: sparse, chosen by `"auto"` for several regions; `"gmres"`: uses old '
-        "factors as preconditioner. The hierarchical operator always uses GMRES",
+        description='`"lu"`: dense; `"mumps"`: sparse, chosen by `"auto"` for several regions, unless they are few and '
+        'small; `"gmres"`: uses old factors as preconditioner. The hierarchical operator always uses GMRES',
     )
     operator: Literal["auto", "dense", "hierarchical"] = Field(
         "auto",

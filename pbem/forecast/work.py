@@ -8,6 +8,7 @@ import numpy as np
 
 from pbem.arrays import Integer
 from pbem.bem.body_factors import choose_body_factors
+from pbem.bem.direct_method import choose_method
 from pbem.bem.operator_choice import choose_operator
 from pbem.bem.rigid_motions import need_rotations
 from pbem.contact.dependence import find_unknowns_of_regions
@@ -67,8 +68,7 @@ def count_work(model: Model, mesh: Mesh) -> Work:
     cracks = mesh.pairs.crack & ~(laws.bonded | laws.parted | laws.follows)
     kept = unknowns - (2 * int(np.count_nonzero(cracks)) if few else 0)
     columns = 2.0 * varying if few else 0.0
-    sparse = model.solver.linear == "mumps" or (model.solver.linear != "lu" and len(model.regions) > 1)
-    if not sparse:
+    if choose_method(model.solver.linear, mesh.region_nodes) == "lu":
         return Work(unknowns, varying, entries, besides, float(kept) ** 2, float(kept) ** 2, 2 / 3 * float(kept) ** 3,
                     columns, False, False, scattered=model.solver.linear == "gmres")
     formed, factored, operations = _count_sparse(model, mesh, outer, laws)

@@ -150,6 +150,11 @@ class Mesh:
         return np.repeat(self.region, self.order + 1)
 
     @property
+    def region_nodes(self) -> Integer:
+        """How many nodes each region has, those of the first faces of its cracks included."""
+        return (self.order + 1) * np.bincount(self.region, minlength=len(self.region_names))
+
+    @property
     def node_curve(self) -> Integer:
         return np.repeat(self.curve, self.order + 1)
 

@@ -83,7 +83,7 @@ PLACES = {
     "meshing": ("pbem.driver", "generate_mesh", 1, 0),
     "assembly": ("pbem.solve.system.dense", "assemble_rows", 1, 0),
     "a step": ("pbem.solve.steps.march", "solve_step", 3, 2),
-    "the linear solver": ("pbem.solve.petsc.linear", "LinearSolver.solve_columns", 2, None),
+    "the linear solver": ("pbem.solve.tangent.reference", "Reference.solve_columns", 2, None),
 }
 
 
@@ -150,7 +150,7 @@ def test_a_run_that_finds_no_equilibrium_returns_3_on_all_ranks(
 UNZIPS = SLIDES_AWAY.replace(
     "friction = 0.2", "friction = 0.2\ncohesion = 0.15\ntensile_strength = 0.5\ncohesion_lost = true"
 ).replace("tx = 0.4", "tx = 0.33")
-SOLVE = ("-1", "pbem.solve.petsc.linear", "LinearSolver.solve_columns", "2")
+SOLVE = ("-1", "pbem.solve.tangent.reference", "Reference.solve_columns", "2")
 REASONS = {"linear solver: ": "ConvergenceError('linear solver', 'INFOG(1) = -9')",
            "singular tangent: ": "ConvergenceError('singular tangent', 'no factors')"}  # fmt: skip
 # Runs that end as not converged, by their names: the case, and what is broken of the program.

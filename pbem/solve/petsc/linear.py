@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from pbem.arrays import Integer, Real
+from pbem.bem.direct_method import OPERATIONS_OF_A_SPARSE_ENTRY, OPERATIONS_OF_AN_ENTRY, Method
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts
 from pbem.solve.petsc.refactoring import FactorWork
 from pbem.solve.petsc.session import PREFIX, PETSc, factor_in_place, pass_over_divergence
 from pbem.solve.petsc.shares import change_shares, find_own_blocks, share_equally
-
-Method = Literal["lu", "mumps"]
 
 # MUMPS' codes (INFOG(1)) for too little work space, which can be asked for again, and for too little memory.
 MORE_ROOM_HELPS = (-8, -9, -11, -12, -14, -15, -17, -18, -20)
@@ -25,21 +24,13 @@ MOST_WORKSPACE = 10_000  # per cent
 # PETSc's codes with which LAPACK and ScaLAPACK report a pivot that is zero; MUMPS sets the solver's reason instead.
 ZERO_PIVOT, LIBRARY_ERROR = 71, 76
 
-# What an operation takes, in those of a large LU factorisation (a tenth of a nanosecond a core): to form and store an
-# entry of the matrix, a call for any columns; an operation on one column (it waits for memory), one on many columns at
-# a time, and such a one of several ranks.
-OPERATIONS_OF_AN_ENTRY, OPERATIONS_OF_A_CALL = 200.0, 2e7
-# MUMPS orders, scales and moves each entry; seconds of the factors of two to four regions (672 to 3720 unknowns) and of
-# their columns, as these two numbers have it, agree within 15 %.
-OPERATIONS_OF_A_SPARSE_ENTRY, SPARSE = 1500.0, 0.7
+# What an operation takes, in those of a large LU factorisation (see pbem.bem.direct_method): a call for any columns; an
+# operation on one column (it waits for memory), one on many columns at a time, and such a one of several ranks.
+OPERATIONS_OF_A_CALL = 2e7
+# Seconds of MUMPS' factors of two to four regions (672 to 3720 unknowns) and of their columns, as this number and that
+# of its entries have it, agree within 15 %.
+SPARSE = 0.7
 SINGLE, MANY, MANY_BY_RANKS = 12.0, 1.0, 4.0
-
-
-def choose_method(requested: str, regions: int) -> Method:
-    """The direct solver: sparse for several regions, since a region's rows are zero in the others' columns."""
-    if requested in ("lu", "mumps"):
-        return "lu" if requested == "lu" else "mumps"
-    return "lu" if regions == 1 else "mumps"
 
 
 class LinearSolver:

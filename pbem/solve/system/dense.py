@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pbem.arrays import Complex, Integer, Real
+from pbem.bem.direct_method import choose_method
 from pbem.bem.interior import InteriorRows
 from pbem.bem.location import Location
 from pbem.bem.operator import RegionRows, RowOperator, add_anchor, assemble_displacement_rows, assemble_rows
@@ -20,7 +21,6 @@ from pbem.contact.loads import OuterNodes, evaluate_load, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import share_nodes
-from pbem.solve.petsc.linear import choose_method
 from pbem.solve.petsc.session import list_options
 from pbem.solve.petsc.shares import cut_equally, refuse_shares
 from pbem.solve.problem.problem import Problem
@@ -49,7 +49,7 @@ class DenseSystem:
     @staticmethod
     def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:
         """What to say when a model cannot be shared by so many ranks; None if it can."""
-        lu = choose_method(model.solver.linear, len(mesh.region_names)) == "lu"
+        lu = choose_method(model.solver.linear, mesh.region_nodes, bool(list_options())) == "lu"
         return refuse_shares(mesh.nodes, ranks, lu and not factors_in_panels(model))
 
     @staticmethod

@@ -18,9 +18,10 @@ from mpi4py import MPI
 from scipy.linalg import lapack
 
 from pbem.arrays import Integer, Real
+from pbem.bem.direct_method import OPERATIONS_OF_AN_ENTRY
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_rows
-from pbem.solve.petsc.linear import OPERATIONS_OF_A_CALL, OPERATIONS_OF_AN_ENTRY, SINGLE
+from pbem.solve.petsc.linear import OPERATIONS_OF_A_CALL, SINGLE
 from pbem.solve.petsc.refactoring import FactorWork
 from pbem.solve.tangent.column_shares import bring_home, exchange, list_rows, multiply_rows, share_columns
 from pbem.solve.tangent.panel_passing import Coming, Passing, receive_ahead

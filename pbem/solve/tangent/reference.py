@@ -18,10 +18,12 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Integer, Real
+from pbem.bem.direct_method import choose_method
 from pbem.bem.operator import RegionRows, RowOperator
 from pbem.clock import clock
 from pbem.parallel import gather_parts, gather_rows
-from pbem.solve.petsc.linear import LinearSolver, choose_method
+from pbem.solve.petsc.linear import LinearSolver
+from pbem.solve.petsc.session import list_options
 from pbem.solve.problem.problem import Problem
 from pbem.solve.tangent.column_shares import multiply_rows, share_columns
 from pbem.solve.tangent.mapped_columns import form_columns, map_columns, take_rows
@@ -51,7 +53,7 @@ class Reference:
     def __init__(self, problem: Problem, rows: TangentRows, eliminated: Integer, panels: bool = False) -> None:
         """panels: dense factors are held in panels of columns, with which nothing but columns can be solved."""
         self.problem, self.operator, self.block_unknowns = problem, rows.operator, rows.block_unknowns
-        self.method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
+        self.method = choose_method(problem.model.solver.linear, problem.mesh.region_nodes, bool(list_options()))
         nodes = problem.mesh.pairs.slave[eliminated]
         kept = np.ones(problem.unknowns, dtype=bool)
         kept.reshape(-1, 2)[nodes] = False
@@ -92,7 +94,7 @@ class Reference:
             if isinstance(self.factors, PanelFactors):
                 self._fill_panels(self.factors, constraints, wanted)
             elif self.method == "lu":
-                self._fill_dense(self.factors, constraints, wanted)
+                self._fill_dense(self.factors, constraints, chosen, wanted)
             else:
                 self._fill_sparse(constraints, chosen, wanted)
             self.free_blocks = self._invert_free_blocks(constraints)
@@ -117,7 +119,9 @@ class Reference:
 
         factors.fill(form)
 
-    def _fill_dense(self, factors: LinearSolver, constraints: sparse.csr_matrix, wanted: list[Integer]) -> None:
+    def _fill_dense(
+        self, factors: LinearSolver, constraints: sparse.csr_matrix, chosen: list[Integer], wanted: list[Integer]
+    ) -> None:
         """Columns of all rows at a time, as they may have to change ranks."""
         operator, numbers = self.operator, np.flatnonzero(self.kept)
         local = np.cumsum(self.kept[self.own]) - 1
@@ -125,13 +129,15 @@ class Reference:
         for begin in range(0, len(numbers), COLUMNS_AT_ONCE):
             columns = numbers[begin : begin + COLUMNS_AT_ONCE]
             values = np.zeros((len(self.kept_rows), len(columns)))
-            for block, rows in zip(operator.blocks, wanted, strict=True):
-                if len(rows):
-                    part = form_columns(operator, block, constraints, columns, rows)
-                    if len(rows) == len(values):
-                        values = part
-                    else:
-                        values[local[block.rows[rows]]] = part
+            for block, every, rows in zip(operator.blocks, chosen, wanted, strict=True):
+                some = every[slice(*np.searchsorted(every, [columns[0], columns[-1] + 1]))]
+                if not len(rows) or not len(some):
+                    continue
+                part = form_columns(operator, block, constraints, some, rows)
+                if part.shape == values.shape:
+                    values = part
+                else:
+                    values[np.ix_(local[block.rows[rows]], np.searchsorted(columns, some))] = part
             factors.fill_columns(begin, values)
 
     def _fill_sparse(self, constraints: sparse.csr_matrix, chosen: list[Integer], wanted: list[Integer]) -> None:

@@ -12,6 +12,7 @@ from pbem.model.model import Model
 from pbem.results.contents import Balances
 from pbem.results.growing import GrowingRows
 from pbem.results.opening import freeze, read_names
+from pbem.results.views import create_group, create_growing, set_texts
 from pbem.solve.problem.step import Step
 
 # Quantities of the regions; of the parts that cracks cut off; of the whole.
@@ -22,17 +23,16 @@ OF_WHOLE = ("whole", "whole_relative")
 
 def create_balance(file: h5py.File, model: Model, mesh: Mesh) -> None:
     """Create the datasets, without entries; the names of regions and parts are an attribute of each."""
-    group, count = file.create_group("balance"), len(mesh.region_names)
+    group, count = create_group(file.id, "balance"), len(mesh.region_names)
     parts = find_parts(mesh)
     cut = [name_part(mesh, parts, int(part), model.origin) for part in np.flatnonzero(parts.cut)]
     shapes = {"resultant": (count, 3), "relative": (count,), "carried": (count,), "whole": (3,), "whole_relative": ()}
     shapes |= {"part_resultant": (len(cut), 3), "part_relative": (len(cut),)} if cut else {}
     for name, shape in shapes.items():
         rows = max(1, min(64, 4096 // (shape[0] if shape else 1)))
-        group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype="f8", chunks=(rows, *shape))
+        dataset = create_growing(group, name, shape, np.dtype("f8"), rows)
         if name not in OF_WHOLE:
-            names = cut if name in OF_PARTS else list(mesh.region_names)
-            group[name].attrs["names"] = np.array(names, dtype=h5py.string_dtype())
+            set_texts(dataset, "names", cut if name in OF_PARTS else mesh.region_names)
 
 
 def append_balance(rows: GrowingRows, step: Step) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from h5py import h5d, h5g
 
 from pbem.arrays import Integer
 from pbem.contact.laws import collect_laws, find_joint
@@ -24,7 +25,7 @@ from pbem.results.interface_tips import list_tip_curves
 from pbem.results.linearity import create_linearity
 from pbem.results.outline import to_columns
 from pbem.results.rigid import create_rigid
-from pbem.results.views import Columns, create_array, create_group, set_attribute
+from pbem.results.views import Columns, create_array, create_group, create_growing, set_attribute, set_texts
 from pbem.version import __version__
 
 ITERATION = np.dtype(
@@ -50,12 +51,12 @@ def list_pair_datasets(model: Model) -> dict[str, str]:
     return SHOWN | {variable.name: variable.kind for variable in list_model_variables(model)}
 
 
-def name_stages(dataset: h5py.Dataset, model: Model) -> None:
+def name_stages(dataset: h5d.DatasetID, model: Model) -> None:
     """Let the file know the stages by name, and which regions are gone in each."""
-    dataset.attrs["names"] = _text([stage.name for stage in model.stages])
+    set_texts(dataset, "names", [stage.name for stage in model.stages])
     removed = [sorted(stage.construction.removed) for stage in model.stages]
     if any(removed):
-        dataset.attrs["removed"] = json.dumps(removed)
+        set_attribute(dataset, "removed", json.dumps(removed))
 
 
 def join_pairs(interfaces: Mapping[str, Integer]) -> Integer:
@@ -75,7 +76,7 @@ def write_attributes(
         "petsc_options": " ".join(petsc_options), "custom_laws": json.dumps(dict(model.law_texts)),
     }
     for name, value in attributes.items():
-        file.attrs[name] = value
+        set_attribute(file.id, name, value)
     for name in ("failure", "failure_reason", MAY_FOLLOW):
         if name in file.attrs:
             del file.attrs[name]
@@ -88,88 +89,93 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: Int
     """
     faces = list_faces(mesh)
     _write_nodes(file, mesh, faces, model.origin)
-    steps = file.create_group("steps")
+    steps = create_group(file.id, "steps")
     for name, kind in STEP_DATASETS.items():
-        _create_growing(steps, name, (), kind)
-    name_stages(steps["stage"], model)
-    fields = file.create_group("fields")
+        dataset = _create_growing(steps, name, (), kind)
+        if name == "stage":
+            name_stages(dataset, model)
+    fields = create_group(file.id, "fields")
     for name in ("displacement", "traction"):
         _create_growing(fields, name, (len(faces.position), 2), "f8")
     _create_growing(fields, "hoop_stress", (len(faces.position),), "f8")
-    together = file.create_group("all")
-    _write_reactions(file.create_group("reactions"), together, [*model.conditions, *model.point_supports])
-    _write_interfaces(file.create_group("contact"), together.create_group("contact"), model, mesh)
-    _write_tips(file.create_group("tips"), together.create_group("tips"), model, mesh)
-    energy = file.create_group("energy")
-    energy.attrs[SELF_ENERGY] = json.dumps(model.self_energy_lengths)
+    together = create_group(file.id, "all")
+    _write_reactions(create_group(file.id, "reactions"), together, [*model.conditions, *model.point_supports])
+    _write_interfaces(create_group(file.id, "contact"), create_group(together, "contact"), model, mesh)
+    _write_tips(create_group(file.id, "tips"), create_group(together, "tips"), model, mesh)
+    energy = create_group(file.id, "energy")
+    set_attribute(energy, SELF_ENERGY, json.dumps(model.self_energy_lengths))
     for name in ENERGIES:
         create_energy(energy, name)
     create_balance(file, model, mesh)
     create_linearity(file, mesh)
     create_rigid(file, model)
-    _write_estimates(file.create_group("estimates"), model, mesh)
+    _write_estimates(create_group(file.id, "estimates"), model, mesh)
     if model.analysis.accuracy is not None or model.refined:
-        _write_fractions(file.create_group("mesh"), model)
+        _write_fractions(create_group(file.id, "mesh"), model)
     if model.interior_points:
-        interior = file.create_group("interior")
-        interior["position"] = to_columns(np.array(model.interior_points) + model.origin)
-        interior["region"] = interior_region.astype("i4")
+        interior = create_group(file.id, "interior")
+        create_array(interior, "position", to_columns(np.array(model.interior_points) + model.origin))
+        create_array(interior, "region", interior_region.astype("i4"))
         _create_growing(interior, "displacement", (len(interior_region), 2), "f8")
         _create_growing(interior, "stress", (len(interior_region), 3), "f8")
-    file.create_dataset("convergence", shape=(0,), maxshape=(None,), dtype=ITERATION, chunks=(256,))
+    create_growing(file.id, "convergence", (), ITERATION, 256)
 
 
 def _write_nodes(file: h5py.File, mesh: Mesh, faces: Faces, origin: complex) -> None:
     crack = np.flatnonzero(mesh.crack)
-    nodes = file.create_group("nodes")
-    nodes["position"] = to_columns(faces.position + origin)
-    nodes["normal"] = to_columns(faces.normal)
-    nodes["element"] = faces.element.astype("i4")
-    nodes["region"] = faces.region.astype("i4")
-    nodes["curve"] = faces.curve.astype("i4")
-    nodes.attrs["order"] = np.int32(mesh.order)
-    elements = file.create_group("elements")
-    elements["vertices"] = np.stack([to_columns(faces.start + origin), to_columns(faces.end + origin)], axis=1)
-    elements["region"] = np.concatenate([mesh.region, mesh.region[crack]]).astype("i4")
-    elements["curve"] = np.concatenate([mesh.curve, mesh.curve[crack]]).astype("i4")
-    elements["sweep"] = faces.sweep
-    elements["crack"] = np.concatenate([mesh.crack, mesh.crack[crack]]).astype("i1")
-    # The second face is travelled the other way.
-    elements["tip"] = np.concatenate([mesh.tip, np.array([0, 2, 1])[mesh.tip[crack]]]).astype("i1")
-    for group in (nodes, elements):
-        group["region"].attrs["names"] = _text(mesh.region_names)
-        group["curve"].attrs["names"] = _text(mesh.curve_names)
+    nodes = {
+        "position": to_columns(faces.position + origin), "normal": to_columns(faces.normal),
+        "element": faces.element.astype("i4"), "region": faces.region.astype("i4"), "curve": faces.curve.astype("i4"),
+    }
+    elements = {
+        "vertices": np.stack([to_columns(faces.start + origin), to_columns(faces.end + origin)], axis=1),
+        "region": np.concatenate([mesh.region, mesh.region[crack]]).astype("i4"),
+        "curve": np.concatenate([mesh.curve, mesh.curve[crack]]).astype("i4"),
+        "sweep": faces.sweep,
+        "crack": np.concatenate([mesh.crack, mesh.crack[crack]]).astype("i1"),
+        # The second face is travelled the other way.
+        "tip": np.concatenate([mesh.tip, np.array([0, 2, 1])[mesh.tip[crack]]]).astype("i1"),
+    }
+    names = {"region": mesh.region_names, "curve": mesh.curve_names}
+    for title, arrays in (("nodes", nodes), ("elements", elements)):
+        group = create_group(file.id, title)
+        for name, values in arrays.items():
+            dataset = create_array(group, name, values)
+            if name in names:
+                set_texts(dataset, "names", names[name])
+        if title == "nodes":
+            set_attribute(group, "order", np.int32(mesh.order))
 
 
-def _write_reactions(group: h5py.Group, together: h5py.Group, names: list[str]) -> None:
-    group.attrs["names"] = _text(names)
+def _write_reactions(group: h5g.GroupID, together: h5g.GroupID, names: list[str]) -> None:
+    set_texts(group, "names", names)
     if not names:
         return
     source = Columns(_create_growing(together, "reactions", (len(names), 2), "f8"))
     for number, name in enumerate(names):
-        source.create_view(group.id, name, number)
+        source.create_view(group, name, number)
 
 
-def _write_tips(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:
+def _write_tips(group: h5g.GroupID, together: h5g.GroupID, model: Model, mesh: Mesh) -> None:
     names = list(list_tip_curves(model, mesh))
-    group.attrs["names"] = _text(names)
+    set_texts(group, "names", names)
     if not names:
         return
     of_crack = {name: region.material.plane_modulus for region in model.regions for name in region.cracks}
-    together["plane_modulus"] = np.array([of_crack.get(name, np.nan) for name in names])
+    create_array(together, "plane_modulus", np.array([of_crack.get(name, np.nan) for name in names]))
     sources = {kind: Columns(_create_growing(together, kind, (len(names), 2), "f8")) for kind in TIP_DATASETS}
     for number, name in enumerate(names):
-        crack = create_group(group.id, name)
+        crack = create_group(group, name)
         for kind, source in sources.items():
             source.create_view(crack, kind, number)
 
 
-def _write_fractions(group: h5py.Group, model: Model) -> None:
+def _write_fractions(group: h5g.GroupID, model: Model) -> None:
     """Where the elements of all legs end, as the mesh may have been refined: leg after leg, curve after curve."""
     legs = [(number, leg) for number, curve in enumerate(model.curves.values()) for leg in curve.legs]
-    group["curve"] = np.array([number for number, _ in legs], dtype="i4")
-    group["elements"] = np.array([leg.elements for _, leg in legs], dtype="i4")
-    group["fractions"] = np.concatenate([leg.element_fractions() for _, leg in legs])
+    create_array(group, "curve", np.array([number for number, _ in legs], dtype="i4"))
+    create_array(group, "elements", np.array([leg.elements for _, leg in legs], dtype="i4"))
+    create_array(group, "fractions", np.concatenate([leg.element_fractions() for _, leg in legs]))
 
 
 def read_fractions(file: h5py.File) -> Fractions | None:
@@ -185,48 +191,48 @@ def read_fractions(file: h5py.File) -> Fractions | None:
     return {name: tuple(legs) for name, legs in ends.items()}
 
 
-def _write_estimates(group: h5py.Group, model: Model, mesh: Mesh) -> None:
+def _write_estimates(group: h5g.GroupID, model: Model, mesh: Mesh) -> None:
     """Estimated errors: a dataset a quantity, its second axis the curves, interfaces or cracks of the attributes."""
     for name, shape in list_datasets(model, mesh).items():
         if 0 not in shape:
             _create_growing(group, name, shape, "f8")
-    group.attrs["curves"] = _text(list(model.conditions))
-    group.attrs["interfaces"] = _text(list(sort_pairs(mesh)))
-    group.attrs["cracks"] = _text(list(model.crack_tips))
-    group.attrs["missing"] = ""
+    set_texts(group, "curves", list(model.conditions))
+    set_texts(group, "interfaces", list(sort_pairs(mesh)))
+    set_texts(group, "cracks", list(model.crack_tips))
+    set_attribute(group, "missing", "")
 
 
-def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:
+def _write_interfaces(group: h5g.GroupID, together: h5g.GroupID, model: Model, mesh: Mesh) -> None:
     """All pairs in one place, interface by interface, and what belongs to each interface in a group of its name."""
     interfaces = sort_pairs(mesh)
-    group.attrs["names"] = _text(list(interfaces))
-    group.attrs["groups"] = json.dumps([dataclasses.asdict(each) for each in model.groups])
-    group.attrs["traces"] = _text([model.traces.get(name, name) for name in interfaces])
-    group.attrs["laws"] = _text([find_joint(model, name).law.kind for name in interfaces])
+    set_texts(group, "names", list(interfaces))
+    set_attribute(group, "groups", json.dumps([dataclasses.asdict(each) for each in model.groups]))
+    set_texts(group, "traces", [model.traces.get(name, name) for name in interfaces])
+    set_texts(group, "laws", [find_joint(model, name).law.kind for name in interfaces])
     counts = [len(pairs) for pairs in interfaces.values()]
     order = join_pairs(interfaces)
-    together["interface"] = np.repeat(np.arange(len(counts)), counts).astype("i4")
-    together["node"] = mesh.pairs.slave[order].astype("i4")
+    create_array(together, "interface", np.repeat(np.arange(len(counts)), counts).astype("i4"))
+    create_array(together, "node", mesh.pairs.slave[order].astype("i4"))
     gap = collect_laws(model, mesh).gap[order]
     if gap.any():
-        together["gap"] = gap
+        create_array(together, "gap", gap)
     fixed = {
         "position": to_columns(mesh.pairs.position[order] + model.origin),
         "normal": to_columns(mesh.pairs.normal[order]), "arc_length": mesh.pairs.arc_length[order],
     }  # fmt: skip
     for name, values in fixed.items():
-        together[name] = values
+        create_array(together, name, values)
     if not counts:
         return
-    sources = {
-        quantity: Columns(_create_growing(together, quantity, (len(order),), kind))
-        for quantity, kind in list_pair_datasets(model).items()
-    }
-    for variable in list_model_variables(model):
-        together[variable.name].attrs["unit"] = variable.unit
+    sources, units = {}, {variable.name: variable.unit for variable in list_model_variables(model)}
+    for quantity, kind in list_pair_datasets(model).items():
+        dataset = _create_growing(together, quantity, (len(order),), kind)
+        if quantity in units:
+            set_attribute(dataset, "unit", units[quantity])
+        sources[quantity] = Columns(dataset)
     first = 0
     for name, pairs in interfaces.items():
-        interface, last = create_group(group.id, name), first + len(pairs)
+        interface, last = create_group(group, name), first + len(pairs)
         for quantity, values in fixed.items():
             create_array(interface, quantity, values[first:last])
         # The common variables are for going on with a run.
@@ -249,10 +255,9 @@ def _describe_interface(group: h5py.h5g.GroupID, model: Model, mesh: Mesh, name:
             set_attribute(group, key, value)
 
 
-def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: str) -> h5py.Dataset:
-    row = max(1, int(np.prod(shape))) * np.dtype(kind).itemsize
-    chunk = (max(1, min(64, CHUNK_BYTES // row)), *(max(1, length) for length in shape))
-    return group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype=kind, chunks=chunk)
+def _create_growing(group: h5g.GroupID, name: str, shape: tuple[int, ...], kind: str) -> h5d.DatasetID:
+    row = max(1, math.prod(shape)) * np.dtype(kind).itemsize
+    return create_growing(group, name, shape, np.dtype(kind), max(1, min(64, CHUNK_BYTES // row)))
 
 
 def count_steps(file: h5py.File) -> int:
@@ -280,10 +285,6 @@ def find_growing(file: h5py.File) -> list[h5py.Group]:
     return [item for name, item in file.items() if name not in OTHERS and isinstance(item, h5py.Group)]
 
 
-def create_energy(group: h5py.Group, name: str) -> h5py.Dataset:
+def create_energy(group: h5g.GroupID, name: str) -> h5d.DatasetID:
     """An energy (k,) that grows with the steps."""
     return _create_growing(group, name, (), "f8")
-
-
-def _text(names: Sequence[str]) -> NDArray[Any]:
-    return np.array(list(names), dtype=h5py.string_dtype())

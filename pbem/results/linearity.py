@@ -9,6 +9,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.results.contents import Linearities
 from pbem.results.growing import GrowingRows
 from pbem.results.opening import freeze, read_names
+from pbem.results.views import create_group, create_growing, set_texts
 from pbem.solve.problem.step import Linearity, Step
 from pbem.solve.steps.linearity import describe_nonlinearity
 
@@ -17,14 +18,13 @@ QUANTITIES = ("strain", "rotation", "slip")
 
 def create_linearity(file: h5py.File, mesh: Mesh) -> None:
     """Create the datasets, without entries; the names of regions or interfaces are an attribute of each."""
-    group = file.create_group("linearity")
+    group = create_group(file.id, "linearity")
     for name, names in zip(QUANTITIES, (mesh.region_names, mesh.region_names, mesh.interface_names), strict=True):
         count = len(names)
         if not count:
             continue
-        chunks = (max(1, min(64, 4096 // count)), count)
-        group.create_dataset(name, shape=(0, count), maxshape=(None, count), dtype="f8", chunks=chunks)
-        group[name].attrs["names"] = np.array(names, dtype=h5py.string_dtype())
+        dataset = create_growing(group, name, (count,), np.dtype("f8"), max(1, min(64, 4096 // count)))
+        set_texts(dataset, "names", names)
 
 
 def append_linearity(rows: GrowingRows, step: Step) -> None:

@@ -123,7 +123,7 @@ def read_last_energy(file: h5py.File) -> Energy:
     group = file["energy"]
     for kind in ("released", "removed"):
         if kind not in group:  # a file of an earlier version
-            create_energy(group, kind).resize(len(group["external"]), axis=0)  # with zeros
+            create_energy(group.id, kind).set_extent(group["external"].shape)  # with zeros
     return Energy(**{kind: float(group[kind][k - 1]) for kind in ENERGIES})
 
 

@@ -14,6 +14,7 @@ from pbem.model.model import Model
 from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference, unit_motions
 from pbem.results.growing import GrowingRows
 from pbem.results.opening import freeze, read_names
+from pbem.results.views import create_group, create_growing, set_attribute, set_texts
 
 # Unknown moments and rotations of a single point are told apart from nothing below this part.
 SINGULAR = 1e-12
@@ -63,19 +64,19 @@ def create_rigid(file: h5py.File, model: Model) -> None:
     """Create a group for each rigid body, without entries; nothing without any."""
     if not model.rigid:
         return
-    group = file.create_group("rigid")
-    group.attrs["names"] = _text(list(model.rigid))
+    group = create_group(file.id, "rigid")
+    set_texts(group, "names", list(model.rigid))
     for name, body in model.rigid.items():
-        own = group.create_group(name)
+        own = create_group(group, name)
         about = find_reference(body, model.curves, model.origin) + model.origin
         # The middle of a circle about 0 is that but for rounding.
         place = [0.0 if abs(part) < NOTHING * model.size else part for part in (about.real, about.imag)]
-        own.attrs["about"] = np.array(place)
-        own.attrs["curves"], own.attrs["known"] = _text(body.curves), _text(body.known)
-        own.attrs["tool"] = body.tool
+        set_attribute(own, "about", np.array(place))
+        set_texts(own, "curves", body.curves)
+        set_texts(own, "known", body.known)
+        set_attribute(own, "tool", body.tool)
         for kind, parts in (("force", FORCES), ("motion", MOTIONS)):
-            dataset = own.create_dataset(kind, shape=(0, 3), maxshape=(None, 3), dtype="f8", chunks=(64, 3))
-            dataset.attrs["names"] = _text(parts)
+            set_texts(create_growing(own, kind, (3,), np.dtype("f8"), 64), "names", parts)
 
 
 def append_rigid(
@@ -111,10 +112,6 @@ def list_rigid_rows(bodies: Mapping[str, RigidMotion], form: str = ".6g") -> lis
          *(f"{value + 0.0:{form}}" for value in (*each.force[-1], *each.motion[-1]))]
         for each in bodies.values()
     ]
-
-
-def _text(names: tuple[str, ...] | list[str]) -> np.ndarray:
-    return np.array(list(names), dtype=h5py.string_dtype())
 
 
 def _read_text(text: bytes | str) -> str:

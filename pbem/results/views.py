@@ -1,18 +1,20 @@
-"""Small parts of a result file made at little cost: views of rows that grow, arrays that do not, attributes.
+"""Parts of a result file made at little cost: rows that grow and views of them, arrays that do not, attributes.
 
 A run with thousands of interfaces has tens of thousands of small datasets. Those that grow with the steps are virtual:
 each shows its columns of one dataset of all interfaces, so that a step is a few writes whatever their number. All that
-is made here goes past h5py's own layer, which takes ten times as long.
+is made here goes past h5py's own layer, which takes three to ten times as long: of a run of a few hundred unknowns that
+is as much as the integrals.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5g, h5p, h5s, h5t
+from h5py import h5a, h5d, h5g, h5i, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 # Arrays up to so many bytes stand in the header of their dataset.
@@ -28,9 +30,10 @@ def create_group(parent: h5g.GroupID, name: str) -> h5g.GroupID:
 class Columns:
     """A dataset that grows by rows (k, columns, ...), to be shown in parts."""
 
-    def __init__(self, source: h5py.Dataset) -> None:
-        self._columns, self._rest = source.shape[1], source.shape[2:]
-        self._name, self._type = source.name.encode(), source.id.get_type()
+    def __init__(self, source: h5d.DatasetID) -> None:
+        self._columns, *rest = source.shape[1:]
+        self._rest = tuple(rest)
+        self._name, self._type = h5i.get_name(source), source.get_type()
         most = (h5s.UNLIMITED, self._columns, *self._rest)
         self._taken = h5s.create_simple((1, *most[1:]), most)
 
@@ -49,20 +52,38 @@ class Columns:
         h5d.create(parent, name.encode(), self._type, _make_rows(shape), properties)
 
 
-def create_array(parent: h5g.GroupID, name: str, values: NDArray[Any]) -> None:
+def create_growing(
+    parent: h5g.GroupID, name: str, shape: tuple[int, ...], kind: np.dtype[Any], rows: int
+) -> h5d.DatasetID:
+    """A dataset without entries, which are of this shape; so many are stored together."""
+    return h5d.create(parent, name.encode(), _find_type(kind), _make_rows(shape), _choose_chunks((rows, *shape)))
+
+
+def create_array(parent: h5g.GroupID, name: str, values: NDArray[Any]) -> h5d.DatasetID:
     """A dataset that does not change."""
     small = 0 < values.nbytes <= COMPACT_BYTES
     dataset = h5d.create(
         parent, name.encode(), _find_type(values.dtype), _make_space(values.shape), _choose_compact() if small else None
     )
-    dataset.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values))
+    if values.size:
+        dataset.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values))
+    return dataset
 
 
-def set_attribute(group: h5g.GroupID, name: str, value: str | bool | int | float) -> None:
-    """The same attribute that `group.attrs[name] = value` makes."""
-    array = np.array(value, dtype=TEXT) if isinstance(value, str) else np.array(value)
-    attribute = h5a.create(group, name.encode(), _find_type(array.dtype), _make_scalar())
-    attribute.write(array)
+def set_attribute(item: h5i.ObjectID, name: str, value: str | bool | int | float | np.generic | NDArray[Any]) -> None:
+    """The same attribute that `item.attrs[name] = value` makes, in place of one of that name."""
+    array = np.array(value, dtype=TEXT) if isinstance(value, str) else np.asarray(value)
+    if h5a.exists(item, name.encode()):
+        h5a.delete(item, name.encode())
+    space = _make_space(array.shape) if array.shape else _make_scalar()
+    attribute = h5a.create(item, name.encode(), _find_type(array.dtype), space)
+    if array.size:
+        attribute.write(array)
+
+
+def set_texts(item: h5i.ObjectID, name: str, texts: Sequence[str]) -> None:
+    """An attribute that is a list of texts."""
+    set_attribute(item, name, np.array(list(texts), dtype=TEXT))
 
 
 TEXT = h5py.string_dtype()
@@ -82,6 +103,14 @@ def _choose_group() -> h5p.PropGCID:
 def _choose_compact() -> h5p.PropDCID:
     properties = h5p.create(h5p.DATASET_CREATE)
     properties.set_layout(h5d.COMPACT)
+    return properties
+
+
+@lru_cache
+def _choose_chunks(chunk: tuple[int, ...]) -> h5p.PropDCID:
+    properties = h5p.create(h5p.DATASET_CREATE)
+    properties.set_chunk(chunk)
+    properties.set_obj_track_times(False)
     return properties
 
 

@@ -130,7 +130,7 @@ class ResultWriter:
                 reached = None if last_step is None else read_last_energy(file)
                 truncate(file, 0 if last_step is None else last_step.number)
                 write_attributes(file, model, ranks, petsc_version, petsc_options)
-                name_stages(file["steps/stage"], model)  # some may have been added
+                name_stages(file["steps/stage"].id, model)  # some may have been added
             writer = cls.__new__(cls)
             writer._start(target, storage, model, mesh, last_step, reached)
             with refuse_damage(target):

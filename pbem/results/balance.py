@@ -11,7 +11,7 @@ from pbem.mesh.parts import find_parts
 from pbem.model.model import Model
 from pbem.results.contents import Balances
 from pbem.results.growing import GrowingRows
-from pbem.results.opening import freeze, read_names
+from pbem.results.opening import freeze, read_array, read_names
 from pbem.results.views import create_group, create_growing, set_texts
 from pbem.solve.problem.step import Step
 
@@ -48,7 +48,7 @@ def read_balance(file: h5py.File, steps: int) -> Balances | None:
     group = file["balance"]
     empty = {"part_resultant": np.zeros((steps, 0, 3)), "part_relative": np.zeros((steps, 0))}
     values = {
-        name: freeze(group[name][:steps] if name in group else empty[name])
+        name: freeze(read_array(group, name)[:steps] if name in group else empty[name])
         for name in (*OF_REGIONS, *OF_PARTS, *OF_WHOLE)
     }
     parts = read_names(group["part_relative"]) if "part_relative" in group else ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import h5py
@@ -59,13 +60,19 @@ class GrowingRows:
         return rows
 
 
+@lru_cache
+def _choose_access() -> h5p.PropDAID:
+    """How the datasets are opened; nothing changes it."""
+    access = h5p.create(h5p.DATASET_ACCESS)
+    access.set_chunk_cache(PLACES, CACHED, 1.0)
+    return access
+
+
 class _Rows:
     """An open dataset that grows."""
 
     def __init__(self, file: h5py.File, path: str) -> None:
-        access = h5p.create(h5p.DATASET_ACCESS)
-        access.set_chunk_cache(PLACES, CACHED, 1.0)
-        self._own = h5d.open(file.id, path.encode(), access)
+        self._own = h5d.open(file.id, path.encode(), _choose_access())
         self._count, *rest = self._own.shape
         self._row, self.kind, self._type = tuple(rest), self._own.dtype, self._own.get_type()
         self._entry = h5s.create_simple((1, *rest))

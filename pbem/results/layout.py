@@ -10,7 +10,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5g
+from h5py import h5d, h5g, h5o, h5s
 
 from pbem.arrays import Integer
 from pbem.contact.laws import collect_laws, find_joint
@@ -264,16 +264,23 @@ def count_steps(file: h5py.File) -> int:
     """How many steps were stored completely: the shortest of all that grows with them."""
     counts: list[int] = []
     # Past h5py's own layer, as all files are asked for that when they are opened.
-    for group in find_growing(file):
-        def count(name: bytes, parent: h5py.h5g.GroupID = group.id) -> None:
-            item = h5py.h5o.open(parent, name)
-            if isinstance(item, h5py.h5d.DatasetID):
-                space = item.get_space()
-                if space.get_simple_extent_dims(True)[:1] == (h5py.h5s.UNLIMITED,):
-                    counts.append(space.get_simple_extent_dims()[0])
-
-        h5py.h5o.visit(group.id, count)
+    for name in file.id:
+        group = None if name.decode() in OTHERS else h5o.open(file.id, name)
+        if isinstance(group, h5g.GroupID):
+            _list_counts(group, counts)
     return min(counts)
+
+
+def _list_counts(group: h5g.GroupID, counts: list[int]) -> None:
+    """Add the numbers of entries of what grows in a group, and in the groups in it."""
+    for name in group:
+        item = h5o.open(group, name)
+        if isinstance(item, h5g.GroupID):
+            _list_counts(item, counts)
+        elif isinstance(item, h5d.DatasetID):
+            space = item.get_space()
+            if space.get_simple_extent_dims(True)[:1] == (h5s.UNLIMITED,):
+                counts.append(space.get_simple_extent_dims()[0])
 
 
 # Groups of what does not grow, or of views of what does.

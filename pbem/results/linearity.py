@@ -8,7 +8,7 @@ import numpy as np
 from pbem.mesh.mesh import Mesh
 from pbem.results.contents import Linearities
 from pbem.results.growing import GrowingRows
-from pbem.results.opening import freeze, read_names
+from pbem.results.opening import freeze, read_array, read_names
 from pbem.results.views import create_group, create_growing, set_texts
 from pbem.solve.problem.step import Linearity, Step
 from pbem.solve.steps.linearity import describe_nonlinearity
@@ -38,7 +38,8 @@ def read_linearity(file: h5py.File, steps: int) -> Linearities | None:
     if "linearity" not in file:
         return None
     group = file["linearity"]
-    values = {name: freeze(group[name][:steps] if name in group else np.zeros((steps, 0))) for name in QUANTITIES}
+    values = {name: freeze(read_array(group, name)[:steps] if name in group else np.zeros((steps, 0)))
+              for name in QUANTITIES}
     interfaces = read_names(group["slip"]) if "slip" in group else ()
     return Linearities(regions=read_names(group["strain"]), interfaces=interfaces, **values)
 

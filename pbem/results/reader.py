@@ -27,7 +27,7 @@ from pbem.results.layout import ENERGIES, read_fractions
 from pbem.results.lazy import AllPairs, Interfaces, InteriorPoints
 from pbem.results.linearity import read_linearity
 from pbem.results.notes import read_notes
-from pbem.results.opening import freeze, open_quietly, read_names, refuse_damage
+from pbem.results.opening import freeze, open_quietly, read_array, read_names, refuse_damage
 from pbem.results.outline import find_tips
 from pbem.results.rigid import RigidMotion, read_rigid
 from pbem.results.sections import (
@@ -313,15 +313,15 @@ def _read(path: Path, file: h5py.File) -> Results:
         ranks=int(attributes["ranks"]),
         units=Units(str(attributes["units_length"]), str(attributes["units_stress"])),
         nodes=Nodes(
-            position=freeze(nodes["position"][...]), normal=freeze(nodes["normal"][...]),
+            position=freeze(read_array(nodes, "position")), normal=freeze(read_array(nodes, "normal")),
             **{name: read_indices(nodes, name) for name in ("region", "curve", "element")},
             order=int(nodes.attrs["order"]), region_names=read_names(nodes["region"]),
             curve_names=read_names(nodes["curve"]),
         ),
         elements=Elements(
-            vertices=freeze(elements["vertices"][...]), sweep=freeze(elements["sweep"][...]),
+            vertices=freeze(read_array(elements, "vertices")), sweep=freeze(read_array(elements, "sweep")),
             region=read_indices(elements, "region"),
-            curve=read_indices(elements, "curve"), crack=freeze(elements["crack"][...].astype(bool)),
+            curve=read_indices(elements, "curve"), crack=freeze(read_array(elements, "crack").astype(bool)),
             tip=read_indices(elements, "tip"),
         ),
         steps=steps,
@@ -334,7 +334,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         balance=read_balance(file, k),
         linearity=read_linearity(file, k),
         interior=read_interior(path, file, k),
-        convergence=freeze(file["convergence"][...]),
+        convergence=freeze(read_array(file, "convergence")),
         rigid=read_rigid(file, k),
         notes=read_notes(file),
     )

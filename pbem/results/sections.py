@@ -13,14 +13,15 @@ from pbem.arrays import Integer, Real
 from pbem.results.contents import Errors, Steps, Tips
 from pbem.results.layout import TIP_DATASETS, count_steps
 from pbem.results.lazy import InteriorPoints
-from pbem.results.opening import freeze, read_names
+from pbem.results.opening import freeze, read_array, read_names
 from pbem.results.trace_names import list_pieces, name_trace, number_piece
 
 
 def read_energy(file: h5py.File, kind: str, k: int) -> Real:
     """A kind of energy (k,) in the stored steps; zero where a file of an earlier version lacks it."""
     group = file["energy"]
-    return np.asarray(group[kind][:k]) if kind in group or kind not in ("released", "removed") else np.zeros(k)
+    there = kind in group or kind not in ("released", "removed")
+    return read_array(group, kind)[:k] if there else np.zeros(k)
 
 
 def read_steps(file: h5py.File) -> Steps:
@@ -28,7 +29,7 @@ def read_steps(file: h5py.File) -> Steps:
     group = file["steps"]
     columns = ("number", "stage", "factor", "iterations", "residual")
     k = count_steps(file)
-    values = {name: freeze(group[name][:k].astype(float if name in ("factor", "residual") else int))
+    values = {name: freeze(read_array(group, name)[:k].astype(float if name in ("factor", "residual") else int))
               for name in columns}
     removed = json.loads(str(group["stage"].attrs.get("removed", "[]")))
     return Steps(**values, stage_names=read_names(group["stage"]), removed=tuple(map(tuple, removed)))
@@ -39,7 +40,7 @@ def read_reactions(file: h5py.File, steps: int) -> dict[str, Real]:
     names = read_names(file["reactions"])
     if not names:
         return {}
-    together = freeze(file["all/reactions"][:steps])
+    together = freeze(read_array(file, "all/reactions")[:steps])
     return {name: together[:, number] for number, name in enumerate(names)}
 
 
@@ -86,8 +87,8 @@ def read_tips(file: h5py.File, steps: int) -> CrackTips:
         return CrackTips({}, {})
     group = file["all/tips"]
     unknown = np.full((steps, len(names), 2), np.nan)  # to older versions
-    values = {kind: freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS}
-    moduli = group["plane_modulus"][...] if "plane_modulus" in group else np.full(len(names), np.nan)
+    values = {kind: freeze(read_array(group, kind)[:steps]) if kind in group else unknown for kind in TIP_DATASETS}
+    moduli = read_array(group, "plane_modulus") if "plane_modulus" in group else np.full(len(names), np.nan)
     return CrackTips({
         name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
         for number, name in enumerate(names)
@@ -137,4 +138,4 @@ def read_interior(path: Path, file: h5py.File, steps: int) -> InteriorPoints | N
 
 def read_indices(group: h5py.Group, name: str) -> Integer:
     """A dataset as indices of NumPy, read-only."""
-    return freeze(group[name][...].astype(np.int64))
+    return freeze(read_array(group, name).astype(np.int64))

@@ -9,6 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
+from pbem.results.layout import count_steps
+from pbem.results.opening import read_array
 from pbem.results.views import create_array, create_group, create_growing, set_attribute, set_texts
 
 
@@ -59,3 +61,26 @@ def test_arrays_are_those_of_h5py(values: np.ndarray, tmp_path: Path) -> None:
         file["other"] = values
         assert file["mine"].id.get_type() == file["other"].id.get_type()
         np.testing.assert_array_equal(file["mine"][...], values)
+
+
+@pytest.mark.parametrize("values", [np.zeros((0, 3)), np.arange(6, dtype="i4"), np.arange(6.0).reshape(2, 3)])
+def test_arrays_are_read_as_by_h5py(values: np.ndarray, tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("g/a", data=values, maxshape=(None, *values.shape[1:]))
+        for name, group in (("g/a", file), ("a", file["g"])):
+            found = read_array(group, name)
+            assert (found.dtype, found.shape) == (file["g/a"].dtype, file["g/a"].shape)
+            np.testing.assert_array_equal(found, values)
+        with pytest.raises(KeyError):
+            read_array(file, "b")
+
+
+def test_steps_are_those_of_the_shortest_of_what_grows(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for path, count in (("steps/number", 5), ("all/contact/slip", 4), ("all/reactions", 6), ("contact/a/slip", 0)):
+            file.create_dataset(path, (count, 2), "f8", maxshape=(None, 2))
+        file.create_dataset("all/contact/node", data=np.arange(2))
+        file.create_dataset("convergence", (1,), "f8", maxshape=(None,))
+        assert count_steps(file) == 4
+        file["all/reactions"].resize(3, axis=0)
+        assert count_steps(file) == 3

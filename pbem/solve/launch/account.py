@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +29,17 @@ from pbem.version import __version__
 MUMPS_LIBRARY = re.compile(r"/libdmumps[a-z_]*-(\d+(?:\.\d+)+)\.so")
 
 
-def list_versions() -> dict[str, str]:
-    """Names and versions of what a run computes with; MUMPS "unknown" where its file does not tell."""
+@cache
+def find_mumps_version() -> str:
+    """Of the library that this process has loaded with PETSc; "unknown" where its file does not tell."""
     files = (os.path.realpath(file) for file in list_mapped_files() if "mumps" in file)
-    found = map(MUMPS_LIBRARY.search, files)
-    mumps = next((match[1] for match in found if match), "unknown")
+    return next((match[1] for match in map(MUMPS_LIBRARY.search, files) if match), "unknown")
+
+
+def list_versions() -> dict[str, str]:
+    """Names and versions of what a run computes with."""
     return {
-        "pbem": __version__, "PETSc": petsc_version(), "MUMPS": mumps, "NumPy": np.__version__,
+        "pbem": __version__, "PETSc": petsc_version(), "MUMPS": find_mumps_version(), "NumPy": np.__version__,
         "MPI": describe_library(), "Python": platform.python_version(),
     }  # fmt: skip
 

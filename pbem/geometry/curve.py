@@ -94,6 +94,11 @@ class Leg:
 
     def element_fractions(self) -> Real:
         """The elements + 1 ends of the elements as fractions of the leg's length."""
+        return self._element_fractions.copy()
+
+    @cached_property
+    def _element_fractions(self) -> Real:
+        """Asked for ten times by what fits lengths, the mesh and the estimates."""
         if self.fractions is not None:
             return np.array(self.fractions)
         return self.divide(self.elements, self.refine_start, self.refine_end)

@@ -77,10 +77,11 @@ def measure(case: Path) -> list[dict[str, Any]]:
     from counted import CountedComm
 
     from pbem.case.build import read_model
+    from pbem.contact.deferred_laws import defer_laws
     from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, follow_leaders, start_memory
-    from pbem.contact.modes import linearise
+    from pbem.errors import CaseError
     from pbem.mesh.generate import generate_mesh
-    from pbem.parallel import abort_if_unexpected, world
+    from pbem.parallel import abort_if_unexpected, do_on_first, world
     from pbem.solve.system.assembly import assemble_problem
 
     def count(action: Any) -> dict[str, Any]:
@@ -97,14 +98,14 @@ def measure(case: Path) -> list[dict[str, Any]]:
 
     with abort_if_unexpected(world, SystemExit):
         begin, comm = find_memory(), CountedComm(world)
-        model = read_model(case)[1]
+        model = do_on_first(world, CaseError, lambda: read_model(case)[1])  # as runs do
         problem = assemble_problem(model, generate_mesh(model), comm)
         laws, load = problem.laws, problem.evaluate_load(0, 1.0)
         random, zeros, memory = np.random.default_rng(7), np.zeros(laws.count), start_memory(laws)
         drawn = random.choice([STICK, SLIP, OPEN], laws.count).astype(np.int8)
         modes = np.where(laws.bonded, memory.modes.mode, drawn)
         state = follow_leaders(laws, ModeState(modes, random.choice([-1.0, 1.0], laws.count)))
-        law = linearise(laws, state, zeros, zeros, memory, load.pressure, problem.traction_scale)
+        law = defer_laws(laws, state, zeros, zeros, memory, load.pressure, problem.traction_scale)
         tangent: Any = problem.make_tangent()
         tangent.solve(problem.constrain(law, load), load, law, 0.5)  # what is made once is made
         part = random.standard_normal((problem.mesh.nodes, 2))[problem.system.nodes].ravel()

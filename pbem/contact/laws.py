@@ -33,7 +33,7 @@ from pbem.contact.strength import choose_strength
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model
 from pbem.model.varying import Places, Value, spread_values
-from pbem.uniform import fold_uniform, repeat_value
+from pbem.uniform import fold_uniform, repeat_value, share_equal
 
 Modes = NDArray[np.int8]
 
@@ -209,9 +209,9 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         fluid_inside=spread([law.pressurised == "all" for law in laws], bool),
         compliance_n=spread([1 / law.normal_stiffness if law.normal_stiffness else 0.0 for law in laws]),
         compliance_s=spread([1 / law.tangential_stiffness if law.tangential_stiffness else 0.0 for law in laws]),
-        stiffness=SOFTNESS * modulus / length,
-        own_stiffness=modulus / np.where(pairs.weight > 0, pairs.weight, length),
-        leader=find_leaders(mesh, model.ties, joints),
+        stiffness=fold_uniform(SOFTNESS * modulus / length),
+        own_stiffness=fold_uniform(modulus / np.where(pairs.weight > 0, pairs.weight, length)),
+        leader=share_equal(find_leaders(mesh, model.ties, joints), pairs.first),
         stiffening=spread([
             1 / closure if isinstance(closure := law.parameters.get("closure"), float) else 0.0 for law in laws
         ]),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pbem.arrays import Bool
+from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.carrier import NO_CARRIERS, find_carriers
+from pbem.geometry.elements import Elements
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import count_elements, divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
@@ -15,42 +17,44 @@ from pbem.mesh.mesh import Links, Mesh, Pairs
 from pbem.mesh.mortar_pairs import describe_sparse_meshes
 from pbem.mesh.pairing import pair_nodes
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
-from pbem.model.model import Model
+from pbem.model.model import Model, Region
+from pbem.uniform import fold_uniform, repeat_value
+
+# The elements of so many curves are put together at a time: small arrays take more room than what is in them.
+JOINED = 256
 
 
 def generate_mesh(model: Model) -> Mesh:
     """Divide every curve as its legs say, once for each region that it bounds, and pair the nodes of interfaces."""
     order = model.analysis.order
     equations = choose_equations(model)
-    chains = _list_chains(model, equations)
+    elements, chains = _list_chains(model, equations)
     counts = [chain.elements.count for chain in chains]
     curve_names = tuple(model.curves)
     number = {name: at for at, name in enumerate(curve_names)}
-    pairs, links = pair_nodes(model, chains)
+    position, normal, weight = _place_nodes(chains, order)
+    pairs, links = pair_nodes(model, chains, (position, normal, weight))
     faces_nothing = _find_free_elements(model, chains, pairs, links)
 
     def repeat(values: list, dtype: type) -> np.ndarray:
-        return np.repeat(np.array(values, dtype=dtype), counts)
-
-    def join(take: Callable[[Chain], np.ndarray]) -> np.ndarray:
-        return np.concatenate([take(chain) for chain in chains], axis=None)
+        return fold_uniform(np.repeat(np.array(values, dtype=dtype), counts))
 
     return Mesh(
         order=order,
         local=place_nodes(order),
         crack_local=place_crack_nodes(order),
-        start=join(lambda chain: chain.elements.start),
-        end=join(lambda chain: chain.elements.end),
-        center=join(lambda chain: chain.elements.center),
-        sweep=join(lambda chain: chain.elements.sweep),
+        start=elements.start,
+        end=elements.end,
+        center=elements.center,
+        sweep=elements.sweep,
         region=repeat([chain.region for chain in chains], np.int64),
         curve=repeat([number[chain.curve] for chain in chains], np.int64),
         crack=repeat([chain.crack for chain in chains], np.bool_),
-        tip=np.concatenate([_mark_tips(model, chain) for chain in chains]),
-        position=join(lambda chain: chain.elements.place(chain.local)),
-        normal=join(lambda chain: chain.elements.normals(chain.local)),
-        weight=join(lambda chain: weigh_nodes(chain.elements, chain.local)),
-        traction_equation=np.repeat(join(lambda chain: chain.traction) & ~faces_nothing, order + 1),
+        tip=fold_uniform(_mark_tips(model, chains)),
+        position=position,
+        normal=normal,
+        weight=weight,
+        traction_equation=_spread_equations(chains, faces_nothing, order),
         pairs=pairs,
         links=links,
         region_names=tuple(region.name for region in model.regions),
@@ -60,13 +64,31 @@ def generate_mesh(model: Model) -> Mesh:
     )
 
 
+def _place_nodes(chains: Sequence[Chain], order: int) -> tuple[Complex, Complex, Real]:
+    """Positions, normals and weights of all nodes, chain by chain into arrays that are there: lists of those of each
+    chain would take their room twice over."""
+    count = sum(chain.elements.count for chain in chains) * (order + 1)
+    position, normal, weight = np.empty(count, dtype=complex), np.empty(count, dtype=complex), np.empty(count)
+    for chain in chains:
+        own = slice(chain.first_node, chain.first_node + chain.elements.count * (order + 1))
+        position[own] = chain.elements.place(chain.local).ravel()
+        normal[own] = chain.elements.normals(chain.local).ravel()
+        weight[own] = weigh_nodes(chain.elements, chain.local).ravel()
+    return position, normal, weight
+
+
+def _spread_equations(chains: Sequence[Chain], faces_nothing: Bool, order: int) -> Bool:
+    traction = np.concatenate([chain.traction for chain in chains]) & ~faces_nothing
+    return fold_uniform(np.repeat(traction, order + 1))
+
+
 def _find_free_elements(model: Model, chains: list[Chain], pairs: Pairs, links: Links) -> Bool:
     """Elements (elements,) of curves in contact that meet nothing of the other curve.
 
     They are free surface, and with HST and DBEM keep the displacement equation like any other.
     """
     faces = _list_contact_faces(model)
-    free = np.concatenate([np.full(chain.elements.count, chain.curve in faces) for chain in chains])
+    free = np.repeat([chain.curve in faces for chain in chains], [chain.elements.count for chain in chains])
     for nodes in (pairs.slave, links.displacement_node, links.traction_node):
         free[nodes // (model.analysis.order + 1)] = False
     return free & (model.analysis.scheme != "THST")
@@ -77,25 +99,39 @@ def _list_contact_faces(model: Model) -> set[str]:
     return {name for contact in model.contacts.values() for name in (contact.first, contact.second)}
 
 
-def _list_chains(model: Model, equations: Equations) -> list[Chain]:
-    order = model.analysis.order
-    chains: list[Chain] = []
+def _list_chains(model: Model, equations: Equations) -> tuple[Elements, list[Chain]]:
+    """The elements of all chains, one after the other, and the chains, whose elements are views of these."""
     faces = _list_contact_faces(model)
     carriers = find_carriers({name: curve for name, curve in model.curves.items() if name in faces})
-    first_node = 0
-    for number, region in enumerate(model.regions):
-        sides = [(side.curve, side.forward, False) for loop in region.loops for side in loop.sides]
-        for curve, forward, crack in [*sides, *((crack, True, True) for crack in region.cracks)]:
-            elements = divide_curve(model.curves[curve])
-            leg = np.repeat(np.arange(len(model.curves[curve].legs)), count_elements(model.curves[curve]))
-            # A crack always has the traction equation.
-            traction = np.array(equations.traction[number, curve]) if not crack else np.full(elements.count, True)
-            if not forward:
-                elements, traction, leg = elements.reverse(), traction[::-1], leg[::-1]
-            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order,
-                                carriers[curve].select(leg) if curve in faces else NO_CARRIERS, region.rigid))
-            first_node += elements.count * (order + 1)
-    return chains
+    sides = [(number, *side) for number, region in enumerate(model.regions) for side in _list_sides(region)]
+    parts: list[Elements] = []
+    joined: list[Elements] = []
+    for _, curve, forward, _ in sides:
+        own = divide_curve(model.curves[curve])
+        parts.append(own if forward else own.reverse())
+        if len(parts) == JOINED:
+            joined, parts = [*joined, Elements.join(parts)], []
+    elements = Elements.join([*joined, *parts]).fold()
+    chains: list[Chain] = []
+    first, per_element = 0, model.analysis.order + 1
+    for number, curve, forward, crack in sides:
+        leg = np.repeat(np.arange(len(model.curves[curve].legs)), count_elements(model.curves[curve]))
+        # A crack always has the traction equation.
+        traction = repeat_value(True, len(leg), bool) if crack else np.array(equations.traction[number, curve])
+        if not forward:
+            traction, leg = traction[::-1], leg[::-1]
+        own = elements.select(slice(first, first + len(leg)))
+        chains.append(Chain(number, curve, forward, crack, traction, own, first * per_element, per_element - 1,
+                            carriers[curve].select(leg) if curve in faces else NO_CARRIERS,
+                            model.regions[number].rigid))
+        first += len(leg)
+    return elements, chains
+
+
+def _list_sides(region: Region) -> list[tuple[str, bool, bool]]:
+    """The curves of a region in its order of travel: name, whether forward, whether a crack."""
+    sides = [(side.curve, side.forward, False) for loop in region.loops for side in loop.sides]
+    return [*sides, *((crack, True, True) for crack in region.cracks)]
 
 
 def _note_contacts(model: Model, pairs: Pairs) -> tuple[str, ...]:
@@ -104,12 +140,15 @@ def _note_contacts(model: Model, pairs: Pairs) -> tuple[str, ...]:
     return describe_sparse_meshes(slots, model.analysis.order)
 
 
-def _mark_tips(model: Model, chain: Chain) -> np.ndarray:
-    tips = np.zeros(chain.elements.count, dtype=np.int8)
-    if chain.crack and model.analysis.tips:
-        at_start, at_end = model.crack_tips[chain.curve]
-        if at_start:
-            tips[0] = 1
-        if at_end:
-            tips[-1] = 2
+def _mark_tips(model: Model, chains: Sequence[Chain]) -> NDArray[np.int8]:
+    """See Mesh.tip; of all chains."""
+    ends = np.cumsum([chain.elements.count for chain in chains])
+    tips = np.zeros(ends[-1], dtype=np.int8)
+    for chain, end in zip(chains, ends, strict=True):
+        if chain.crack and model.analysis.tips:
+            at_start, at_end = model.crack_tips[chain.curve]
+            if at_start:
+                tips[end - chain.elements.count] = 1
+            if at_end:
+                tips[end - 1] = 2
     return tips

@@ -13,7 +13,7 @@ from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import list_faces
 from pbem.results.energy import EnergyBalance
-from pbem.uniform import fold_uniform, is_nothing, repeat_value
+from pbem.uniform import fold_uniform, is_nothing, repeat_value, share_equal
 from tests.unit.case_sample import build
 
 FIELD = """
@@ -107,3 +107,12 @@ def test_the_energy_balance_stores_no_fields_of_its_own() -> None:
 def test_nothing_is_a_zero_that_stands_for_all() -> None:
     assert is_nothing(repeat_value(0.0, 5, complex))
     assert not is_nothing(repeat_value(1e-300, 5)) and not is_nothing(np.zeros(5))
+
+
+def test_arrays_of_the_same_bits_are_one() -> None:
+    values, same = np.array([0.1, np.nan, -0.0]), np.array([0.1, np.nan, -0.0])
+    other, longer, single = np.array([0.1, np.nan, 0.0]), np.arange(4.0), values.astype(np.float32)
+    assert share_equal(values, longer, single, other, same) is same
+    assert share_equal(values, longer, single, other) is values
+    assert share_equal(repeat_value(3, 4, int), np.full(4, 3)).strides == (8,)
+    assert share_equal(values) is values

@@ -13,6 +13,7 @@ from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.elements.arc import Arc
 from pbem.geometry.elements.kind import Crossing, Kind, Piece, Shape
 from pbem.geometry.elements.straight import Straight
+from pbem.uniform import fold_uniform
 
 STRAIGHT, ARC = Straight(), Arc()
 KINDS: tuple[Kind, ...] = (STRAIGHT, ARC)
@@ -62,6 +63,10 @@ class Elements:
     @classmethod
     def join(cls, parts: Sequence[Elements]) -> Elements:
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
+
+    def fold(self) -> Elements:
+        """The same; of straight ones alone the zeros for centres and angles take no room and cannot be written to."""
+        return Elements(self.start, self.end, fold_uniform(self.center), fold_uniform(self.sweep))
 
     @property
     def count(self) -> int:

@@ -175,10 +175,6 @@ class HierarchicalOperator:
     rigid: tuple[RigidMotions, ...]
     anchorings: tuple[Anchoring, ...] = ()
 
-    def keep_needed(self, v: Real) -> Real:
-        """v with zeros in the entries that the operator was told to leave out."""
-        return np.where(self.needed, v, 0.0)
-
     @property
     def rows(self) -> int:
         return 2 * len(self.nodes)

@@ -343,11 +343,12 @@ def start_memory(laws: PairLaws) -> Memory:
     is_open = laws.parted | (laws.gap > 0) & (laws.at_rest_n <= 0) & ~laws.bonded  # joints may bear tension at rest
     sticks = resists_slip(laws) & ~find_creeping(laws)
     closed = np.where(sticks | laws.bonded, STICK, SLIP)
-    modes = ModeState(np.where(is_open, OPEN, closed).astype(np.int8)[laws.leader], np.ones(laws.count))
+    modes = ModeState(np.where(is_open, OPEN, closed).astype(np.int8)[laws.leader], repeat_value(1.0, laws.count))
     internal = lay_out(laws)
     for variable, at, parameters in _list_parts(laws):
         internal[variable.name][at] = variable.start(parameters)
-    return Memory(modes, 0.0 - laws.at_rest_s, internal, np.zeros(laws.count), laws.gap).lose(laws.brittle & is_open)
+    slip, none = fold_uniform(0.0 - laws.at_rest_s), repeat_value(0.0, laws.count)
+    return Memory(modes, slip, internal, none, laws.gap).lose(laws.brittle & is_open)
 
 
 def lay_out(laws: PairLaws) -> dict[str, NDArray[Any]]:

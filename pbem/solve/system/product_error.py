@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from mpi4py import MPI
 
-from pbem.arrays import Real
+from pbem.arrays import Integer, Real
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.operator import scale_equations
 from pbem.bem.rigid_motions import take_off_rotations
 from pbem.bem.rows import evaluate_rows
-from pbem.mesh.numbering import list_nodes, number_components, split_components
+from pbem.mesh.numbering import number_components, split_components
 from pbem.parallel import add_up
 
 # Collocation points whose rows are evaluated exactly, spread over the whole model.
 SAMPLES = 64
-# Entries of exact rows that are held at once.
-MOST_ENTRIES = 4_000_000
+# Entries of exact rows that are held at once, and nodes whose parts of a test vector are made at once.
+MOST_ENTRIES, MADE = 200_000, 4096
 
 
 def measure_product_error(comm: MPI.Intracomm, operator: HierarchicalOperator, length: float) -> float:
@@ -32,15 +34,10 @@ def measure_equations(
     comm: MPI.Intracomm, operator: HierarchicalOperator, v: Real, length: float
 ) -> tuple[float, float]:
     """Sums over the sampled rows of squares: of exact less hierarchical product with v, and of the exact one."""
-    mesh = operator.parts.mesh
-    # Of tools all rows are stored.
-    elastic = np.array([material.rigid is None for material in operator.parts.materials])
-    candidates = np.flatnonzero(elastic[mesh.node_region])
-    sample = candidates[np.unique(np.linspace(0, len(candidates) - 1, SAMPLES).astype(int))]
-    own = np.flatnonzero(np.isin(operator.nodes, sample))
+    own = np.flatnonzero(np.isin(operator.nodes, _choose_samples(operator)))
     product = operator.apply(v)
     exact = np.zeros(2 * len(own))
-    strained = take_off_rotations(v, operator.rigid)
+    strained = take_off_rotations(v, operator.rigid) if any(each.interpolated for each in operator.rigid) else v
     for k, number in enumerate(own):
         exact[2 * k : 2 * k + 2] = _evaluate_exactly(operator, int(operator.nodes[number]), strained, length)
     rows = number_components(own)
@@ -61,38 +58,62 @@ def _compare(comm: MPI.Intracomm, operator: HierarchicalOperator, v: Real, lengt
     return float(np.sqrt(difference / whole)) if whole > 0 else 0.0
 
 
-def _make_test_vectors(operator: HierarchicalOperator, length: float) -> tuple[Real, Real]:
+def _choose_samples(operator: HierarchicalOperator) -> Integer:
+    """Nodes spread over all those of elastic regions; of tools all rows are stored."""
+    mesh, per_element = operator.parts.mesh, operator.parts.mesh.order + 1
+    elastic = np.array([material.rigid is None for material in operator.parts.materials])
+    elements = np.flatnonzero(elastic[mesh.region])
+    number = np.unique(np.linspace(0, per_element * len(elements) - 1, SAMPLES).astype(int))
+    return elements[number // per_element] * per_element + number % per_element
+
+
+def _make_test_vectors(operator: HierarchicalOperator, length: float) -> Iterator[Real]:
+    """One after the other, made some nodes at a time: whole on each rank, they are most of what assembly takes there.
+    """
     mesh = operator.parts.mesh
-    modulus = np.array([material.shear_modulus for material in operator.parts.materials])[mesh.node_region] / length
+    modulus = np.array([material.shear_modulus for material in operator.parts.materials]) / length
+    parts = [np.arange(begin, min(begin + MADE, mesh.nodes)) for begin in range(0, mesh.nodes, MADE)]
+
+    def take_moduli(nodes: Integer) -> Real:
+        return modulus[mesh.region[nodes // (mesh.order + 1)]]
+
+    def keep_needed(v: Real) -> Real:
+        v[~operator.needed] = 0.0
+        return v
+
     random = np.random.default_rng(0).standard_normal(4 * mesh.nodes)
+    for nodes in parts:
+        random[2 * (mesh.nodes + nodes[0]) :][: 2 * len(nodes)] *= np.repeat(take_moduli(nodes), 2)
+    yield keep_needed(random)
     middle = mesh.position.mean()
-    displacement = np.where(mesh.node_crack, -mesh.normal, (mesh.position - middle) / length)
-    traction = np.where(mesh.node_crack, 0, modulus * mesh.normal)
-    coherent = np.concatenate([displacement, traction])
-    random[2 * mesh.nodes :] *= np.repeat(modulus, 2)
-    return operator.keep_needed(random), operator.keep_needed(split_components(coherent))
+    coherent = random.reshape(2, mesh.nodes, 2)  # whoever has taken the first has done with it
+    for nodes in parts:
+        crack = mesh.crack[nodes // (mesh.order + 1)]
+        displacement = np.where(crack, -mesh.normal[nodes], (mesh.position[nodes] - middle) / length)
+        traction = np.where(crack, 0, take_moduli(nodes) * mesh.normal[nodes])
+        for half, values in zip(coherent, (displacement, traction), strict=True):
+            half[nodes, 0], half[nodes, 1] = values.real, values.imag
+    yield keep_needed(random)
 
 
 def _evaluate_exactly(operator: HierarchicalOperator, node: int, v: Real, length: float) -> Real:
     """The row of one node, less its free term, times v."""
     parts, mesh = operator.parts, operator.parts.mesh
-    region = int(mesh.node_region[node])
+    at, element, width = np.array([node]), node // (mesh.order + 1), 2 * (mesh.order + 1)
+    region = int(mesh.region[element])
     sources, first = parts.sources[region], int(parts.first_element[region])
-    nodes = list_nodes(mesh, first + np.arange(sources.count))
-    normal = mesh.normal[[node]] if mesh.traction_equation[node] else None
+    normal = mesh.normal[at] if mesh.traction_equation[node] else None
     bounded = bool((sources.family == 0).any())
-    on = np.array([mesh.node_element[node] - first])
     total = np.zeros(2)
-    step = max(1, MOST_ENTRIES // (8 * (mesh.order + 1)))
-    columns = number_components(nodes)
+    step = max(1, MOST_ENTRIES // (4 * width))
     for begin in range(0, sources.count, step):
         chosen = np.arange(begin, min(begin + step, sources.count))
-        inside = np.where((on >= begin) & (on < begin + step), on - begin, -1)
+        inside = np.array([element - first - begin if begin <= element - first < begin + step else -1])
         values = evaluate_rows(
-            sources.select(chosen), mesh.position[[node]], inside, normal, bounded, mesh.node_local[[node]]
+            sources.select(chosen), mesh.position[at], inside, normal, bounded, mesh.take_local(at)
         )
-        at = columns[2 * (mesh.order + 1) * begin :][: values[0].shape[1]]
-        total += values[0] @ v[at]
-        if values[1] is not None:
-            total += values[1] @ v[2 * mesh.nodes + at]
-    return -float(scale_equations(mesh, parts.materials, length)[node]) * total
+        own = slice(width * (first + begin), width * (first + begin + len(chosen)))
+        for matrix, densities in zip(values, v.reshape(2, -1), strict=True):
+            if matrix is not None:
+                total += matrix @ densities[own]
+    return -float(scale_equations(mesh, parts.materials, length, at)[0]) * total

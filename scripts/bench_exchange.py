@@ -115,13 +115,13 @@ def measure(case: Path) -> list[dict[str, Any]]:
             at = time.process_time()
             problem.system.operator.apply_seen(np.zeros(problem.system.seen.count))
             seconds.append(time.process_time() - at)
-        seen: set[int] = set()
+        now, seen = find_memory() - begin, set[int]()  # what lists the pieces takes memory itself
         pieces = {
             name: sum(list_bytes(piece, seen)) for name, piece in name_pieces(problem, tangent, law, load).items()
         }
         return world.gather({
             "unknowns": problem.unknowns, "own": len(part), "product": product, "preconditioned": preconditioned,
-            "seconds": min(seconds), "memory": find_memory() - begin, "pieces": pieces,
+            "seconds": min(seconds), "memory": now, "pieces": pieces,
         }) or []  # fmt: skip
 
 

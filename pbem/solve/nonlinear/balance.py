@@ -24,6 +24,8 @@ from pbem.uniform import repeat_value
 ROUNDING, FAINT = 1e-9, 1e-6
 # Motions that differ by less than this part of their size are one.
 SAME = 1e-9
+# Faces that are added up at a time: what each is moved and multiplied by takes more room than the faces.
+ADDED = 8192
 
 
 def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions) -> Balance:
@@ -188,30 +190,45 @@ def _add_up(
     middle: about which moments are taken; None for that of each body's boundary.
     """
 
-    def add(values: Real) -> Real:
-        return np.bincount(of, faces.weight * values, count).astype(float)
+    parts = [slice(begin, begin + ADDED) for begin in range(0, len(of), ADDED)]
 
-    def add_vectors(values: Complex) -> Complex:
-        return add(values.real) + 1j * add(values.imag)
+    def add(own: slice, values: Real) -> Real:
+        return np.bincount(of[own], faces.weight[own] * values, count).astype(float)
+
+    def add_vectors(own: slice, values: Complex) -> Complex:
+        return add(own, values.real) + 1j * add(own, values.imag)
 
     if middle is None:
-        outline = faces.bounding.astype(float)
-        length = add(outline)
+        length, offset = np.zeros(count), np.zeros(count, dtype=complex)
         # About a node of the body first, as coordinates can be large.
         start = np.append(faces.position, 0j)[np.searchsorted(of, np.arange(count))]
+        for own in parts:
+            outline = faces.bounding[own].astype(float)
+            length += add(own, outline)
+            offset += add_vectors(own, outline * (faces.position[own] - start[of[own]]))
         # Of a plane with nothing but cracks in it there is no boundary.
-        middles = start + add_vectors(outline * (faces.position - start[of])) / np.where(length > 0, length, 1.0)
+        middles = start + offset / np.where(length > 0, length, 1.0)
     else:
         middles = np.full(count, middle)
-    lever = faces.position - middles[of]
-    whole, known = faces.traction, faces.known
-    elastic = whole - known if any(known.strides) else whole
-    # Loads of which none is left over on a body are no less a measure of its errors: fluid on both faces of a crack,
-    # in-situ stress.
+    force = np.zeros(count, dtype=complex)
+    moment, forces, least_forces, moments, least_moments, known_forces, known_moments = np.zeros((7, count))
+    for own in parts:
+        lever, whole, known = faces.position[own] - middles[of[own]], faces.traction[own], faces.known[own]
+        elastic = whole - known
+        force += add_vectors(own, elastic)
+        moment += add(own, (np.conj(lever) * elastic).imag)
+        # Loads of which none is left over on a body are no less a measure of its errors: fluid on both faces of a
+        # crack, in-situ stress.
+        forces += add(own, np.abs(whole))
+        least_forces += add(own, np.ones(len(lever)))
+        moments += add(own, np.abs(whole * lever))
+        least_moments += add(own, np.abs(lever))
+        known_forces += add(own, np.abs(known))
+        known_moments += add(own, np.abs(known * lever))
     return _Sums(
-        middle=middles, force=add_vectors(elastic), moment=add((np.conj(lever) * elastic).imag),
-        forces=np.maximum(add(np.abs(whole)), least * add(np.ones(len(of)))) + add(np.abs(known)),
-        moments=np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever))) + add(np.abs(known * lever)),
+        middle=middles, force=force, moment=moment,
+        forces=np.maximum(forces, least * least_forces) + known_forces,
+        moments=np.maximum(moments, least * least_moments) + known_moments,
     )
 
 
@@ -258,11 +275,15 @@ def _measure_whole(
     # Tools act by what their contacts carry: on bodies that are gone, by nothing.
     tools = np.array([region.rigid for region in problem.model.regions])[of]
     acting = np.where(_find_wet(problem)[faces.node], ~tools, outer[faces.node] != tools)
-    seen = replace(
-        faces, traction=np.where(acting, np.where(tools, -1.0, 1.0) * faces.traction, 0.0),
-        weight=np.where(acting | (faces.bounding & (faces.known != 0)), faces.weight, 0.0),
+    chosen = acting | (faces.bounding & (faces.known != 0))
+    # Of all others, most of a large model, nothing is taken but the place of the first.
+    own = np.flatnonzero(chosen | (np.arange(len(of)) == 0))
+    seen = _Faces(
+        faces.node[own], faces.position[own], np.where(chosen[own], faces.weight[own], 0.0),
+        np.where(acting[own], np.where(tools[own], -1.0, 1.0) * faces.traction[own], 0.0), faces.known[own],
+        faces.bounding[own],
     )
-    sums = _add_up(seen, np.zeros(len(of), dtype=np.int64), 1, least)
+    sums = _add_up(seen, np.zeros(len(own), dtype=np.int64), 1, least)
     bodies = _add_up(faces, of, len(problem.mesh.region_names), least, middle=complex(sums.middle[0]))
     sums = replace(
         sums, force=sums.force - carried_force, forces=bodies.forces.max(keepdims=True),

@@ -24,11 +24,13 @@ ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"
 ROUNDING = 1e-13
 
 # The estimates are to be so many times below the accuracy: they are within a factor, and too small more often.
-SAFETY = 1.5
+SAFETY = 2.0
 
 # Passes at most, and unknowns at most over those of the first mesh.
 MOST_PASSES = 20
 MOST_GROWTH = 40.0
+# Or this number, if that is more: what a few elements begin with says nothing of what is needed.
+LEAST_LIMIT = 4000
 
 # Part of the estimated energy of the error in the elements that are refined: near the goal, and far from it.
 PART, LARGE_PART = 0.7, 0.9
@@ -129,13 +131,14 @@ def decide(
     if reached.worst * SAFETY <= accuracy:
         return Decision((says,))
     over = ", ".join(f"{name} {error:.1e}" for name, error in reached.errors.items() if not error * SAFETY <= accuracy)
-    failure = ""
+    failure, most = "", max(MOST_GROWTH * one.first_unknowns, LEAST_LIMIT)
     unknown = bool(np.isnan(reached.worst))
-    if unknown and (estimator.missing or one.number >= MOST_PASSES or unknowns > MOST_GROWTH * one.first_unknowns):
+    if unknown and (estimator.missing or one.number >= MOST_PASSES or unknowns > most):
         why = estimator.missing or UNSEEN
         failure = f"errors cannot be estimated ({why}): whether {accuracy:g} is reached is not known"
-    elif one.number >= MOST_PASSES or unknowns > MOST_GROWTH * one.first_unknowns:
-        limit = f"{one.number} passes" if one.number >= MOST_PASSES else f"{MOST_GROWTH:g} times the first unknowns"
+    elif one.number >= MOST_PASSES or unknowns > most:
+        many = f"{MOST_GROWTH:g} times the first unknowns" if most > LEAST_LIMIT else f"{LEAST_LIMIT} unknowns"
+        limit = f"{one.number} passes" if one.number >= MOST_PASSES else many
         failure = (
             f"{accuracy:g} is not reached within {limit} ({unknowns} unknowns): {over}; the file holds the last pass"
         )

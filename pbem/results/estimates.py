@@ -190,6 +190,7 @@ class Comparison:
         else:
             energy = measure_energy(self._model, self._mesh, self._beside, step, second)
             least = self._bound_jumps(step)
+            self._away = self._choose_divisor(energy, self._factor_shares)  # of factors, and of jumps off corners
             estimates = self._subtract(step, second, self._beside, energy, least)
             self.energy = np.maximum(self.energy, energy)
             located = self._locate_jumps(step.contact, second.contact, self._beside, least)
@@ -203,19 +204,14 @@ class Comparison:
 
     def _subtract(self, step: Step, second: Step, beside: Beside, energy: Real, least_jumps: Real) -> Estimates:
         """What the two solutions differ by, over the divisors (theory, 77); least_jumps: of `_bound_jumps`."""
-        by, of_forces, of_factors = 1.0 / self._divisor, 1.0, 1.0
-        if self._divisor > 1:
-            square = energy.sum(axis=0) / self._modulus
-            of_forces = choose_force_divisor(square, self._force_shares, self._divisor)
-            of_factors = choose_force_divisor(square, self._factor_shares, self._divisor)
-        forces = sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second)
-        forces = forces / of_forces
+        mine, other = sum_reactions(self._model, self._mesh, step), sum_reactions(beside.model, beside.mesh, second)
+        forces = (mine - other) / self._choose_divisor(energy, self._force_shares)
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)
         of_zones = [least_jumps[own].max(axis=0) for own in self._interfaces]
         opening, slip = np.maximum([opening, slip], np.reshape(of_zones, (-1, 2)).T)
         both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
         cracks = len(self._model.crack_tips)  # the two meshes need not see the same cracks along interfaces
-        factors = [np.abs(mine[:cracks] - other[:cracks]) / of_factors for mine, other in zip(*both, strict=True)]
+        factors = [np.abs(one[:cracks] - two[:cracks]) / self._away for one, two in zip(*both, strict=True)]
         moved = subtract_displacements(self._mesh, beside, step, second)
         least = self._bound_factors(step.contact, np.fmax(opening, slip))
         KI, KII = (np.maximum(each, least) for each in factors)
@@ -224,8 +220,12 @@ class Comparison:
             reactions = np.maximum(reactions, bound_reactions(self._model, self._mesh, step))
         return Estimates(
             reactions, opening, slip, traction_n, traction_s, KI, KII,
-            by * _largest(np.abs(moved[~beside.mesh.node_crack])),
+            _largest(np.abs(moved[~beside.mesh.node_crack])) / self._divisor,
         )
+
+    def _choose_divisor(self, energy: Real, shares: Real | None) -> float:
+        square = energy.sum(axis=0) / self._modulus
+        return choose_force_divisor(square, shares if self._divisor > 1 else None, self._divisor)
 
     def _bound_jumps(self, step: Step) -> Real:
         """The least errors (m, 2) of opening and slip at the run's pairs."""
@@ -276,7 +276,7 @@ class Comparison:
         vanish at a crack's end are off by no more than what they are.
         """
         differences = self._subtract_jumps(name, mine, other, beside)
-        errors = differences / self._jump_divisor
+        errors = differences / np.minimum(self._jump_divisor, self._away)
         most = np.abs(getattr(other, name) - (self._other_gap if name == "opening" else 0.0))
         most = np.maximum(most, np.abs(differences))
         return np.asarray(np.where(self._weak, np.clip(errors, -most, most), errors))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -142,26 +143,31 @@ def list_force_shares(model: Model, beside: Beside, smooth: float) -> Real | Non
     are r times as long, and with twice that power of the number of nodes of an element. smooth: what it is divided by
     elsewhere.
     """
-    return _list_shares(model, beside, smooth, math.inf)
+    return _list_shares(model, beside, smooth, {end.curve: math.inf for end in list_corner_ends(model)})
 
 
 def list_factor_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
-    """The same for factors, of which only ends of cracks on interfaces with a softer material tell; None without."""
-    if all(end.power >= WEAK for end in list_corner_ends(model)):
+    """The same for factors, and jumps away from corners, of which ends of cracks on interfaces with a softer material
+    tell, and corners of cracks; None without. The errors there, and what they add elsewhere, fall by r^(2 lambda) for
+    the power lambda of the distance.
+    """
+    ends = list_corner_ends(model)
+    below = {end.curve: 1.0 if end.curve in model.crack_tips else WEAK for end in ends}
+    if all(end.power >= below[end.curve] for end in ends):
         return None
-    return _list_shares(model, beside, smooth, WEAK)
+    return _list_shares(model, beside, smooth, below)
 
 
-def _list_shares(model: Model, beside: Beside, smooth: float, below: float) -> Real | None:
-    """below: corners with this power or more are as anything else."""
+def _list_shares(model: Model, beside: Beside, smooth: float, below: Mapping[str, float]) -> Real | None:
+    """below: by curve; corners with this power or more are as anything else, infinite where all count."""
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
     by = np.full(beside.fine.elements, 1 / smooth)
     for name, own in list_curve_elements(beside.model, beside.mesh):
         for element, ratio, power in at_corner.get(name, ()):
-            if power < below or math.isinf(below):
+            if power < below[name] or math.isinf(below[name]):
                 at = fine[own[element]]
-                rate = 2 * power if power < WEAK else FORCE_RATE
+                rate = 2 * power if power < WEAK or power < below[name] <= 1.0 else FORCE_RATE
                 by[at] = np.maximum(by[at], 1 / (_find_rise(beside, ratio, rate) - 1))
     return np.asarray(by)
 

@@ -24,6 +24,7 @@ from pbem.results.rates import (
     choose_jump_divisors,
     find_corner_power,
     find_weak_ends,
+    list_factor_shares,
     list_force_shares,
 )
 from pbem.solve.estimate.coarser_mesh import Beside, put_beside
@@ -135,6 +136,21 @@ def test_differences_of_forces_are_divided_by_where_they_come_from(plate: Model)
     assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(corner)
     assert choose_force_divisor(np.zeros_like(square), shares, SMOOTH) == SMOOTH
     assert choose_force_divisor(np.ones_like(square), None, SMOOTH) == SMOOTH
+
+
+def test_factors_of_cracks_that_turn_fall_with_what_is_wrong_where_they_do(plate: Model) -> None:
+    beside = put(plate)
+    shares = list_factor_shares(plate, beside, SMOOTH)
+    assert shares is not None
+    square = np.zeros(beside.fine.elements)
+    square[take_element(plate, beside.fine, "wing", 0)] = 1.0
+    # Outside a corner of 60 degrees displacements follow the power 0.616, products of two errors twice that.
+    assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(2 ** (2 * 0.615731) - 1, rel=1e-5)
+    # Corners of the plate say nothing of cracks, nor do smooth parts and mouths.
+    for name, number in (("bottom", 0), ("branch", 0), ("before", 7), ("leg", 3)):
+        square = np.zeros(beside.fine.elements)
+        square[take_element(plate, beside.fine, name, number)] = 1.0
+        assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(SMOOTH)
 
 
 def test_differences_at_corners_to_a_lower_order_are_divided_by_less(plate: Model) -> None:

@@ -211,6 +211,16 @@ def test_what_is_not_reached_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert len(results.steps) == 2
 
 
+def test_few_first_unknowns_do_not_limit_what_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MOST_GROWTH", 1.0)
+    (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=1e-3))
+    found = pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    assert found.status == "finished"
+    monkeypatch.setattr(limits, "LEAST_LIMIT", 10)
+    with pytest.raises(ConvergenceError, match="not reached within 1 times the first unknowns"):
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5", force=True)
+
+
 @pytest.fixture
 def failing_second_pass(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
     """From the second pass on, an exception after the first step."""

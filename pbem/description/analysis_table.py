@@ -26,7 +26,7 @@ class AnalysisTable(Table):
     steps: Count = Field(10, description="number of load steps; without effect if there are `[[stages]]`")
     accuracy: Part | None = Field(
         None,
-        description="refine and solve again until 1.5 times the estimated relative errors of reactions, of slips and "
+        description="refine and solve again until twice the estimated relative errors of reactions, of slips and "
         "openings, and of K are below this value at every stored step; see `pbem help accuracy`",
     )
     grade_contact_ends: Literal["auto"] | Flag = Field(

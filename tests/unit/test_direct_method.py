@@ -55,3 +55,6 @@ def test_small_regions_get_dense_factors_unless_there_are_options() -> None:
     assert find_method() == "lu"
     with petsc_options({"mat_mumps_icntl_14": "40"}):
         assert find_method() == "mumps"
+    # An account of time is one of the run without it.
+    with petsc_options({"log_view": "", "newton_bodies": "1"}):
+        assert find_method() == "lu"

@@ -66,6 +66,11 @@ def list_options() -> list[str]:
     return list(PETSc.Options(PREFIX).getAll())
 
 
+def list_factor_options() -> list[str]:
+    """Those of them that a solver or its factors may heed: not those of PETSc's account, nor the program's own."""
+    return [name for name in list_options() if name.startswith(("ksp_", "pc_", "mat_"))]
+
+
 def find_number(name: str, default: float) -> float:
     """The value of an option of the program's own under its prefix."""
     return float(PETSc.Options(PREFIX).getReal(name, default))

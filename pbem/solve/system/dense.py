@@ -21,7 +21,7 @@ from pbem.contact.loads import OuterNodes, evaluate_load, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import share_nodes
-from pbem.solve.petsc.session import list_options
+from pbem.solve.petsc.session import list_factor_options, list_options
 from pbem.solve.petsc.shares import cut_equally, refuse_shares
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
@@ -49,7 +49,7 @@ class DenseSystem:
     @staticmethod
     def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:
         """What to say when a model cannot be shared by so many ranks; None if it can."""
-        lu = choose_method(model.solver.linear, mesh.region_nodes, bool(list_options())) == "lu"
+        lu = choose_method(model.solver.linear, mesh.region_nodes, bool(list_factor_options())) == "lu"
         return refuse_shares(mesh.nodes, ranks, lu and not factors_in_panels(model))
 
     @staticmethod

@@ -23,7 +23,7 @@ from pbem.bem.operator import RegionRows, RowOperator
 from pbem.clock import clock
 from pbem.parallel import gather_parts, gather_rows
 from pbem.solve.petsc.linear import LinearSolver
-from pbem.solve.petsc.session import list_options
+from pbem.solve.petsc.session import list_factor_options
 from pbem.solve.problem.problem import Problem
 from pbem.solve.tangent.column_shares import multiply_rows, share_columns
 from pbem.solve.tangent.mapped_columns import form_columns, map_columns, take_rows
@@ -53,7 +53,7 @@ class Reference:
     def __init__(self, problem: Problem, rows: TangentRows, eliminated: Integer, panels: bool = False) -> None:
         """panels: dense factors are held in panels of columns, with which nothing but columns can be solved."""
         self.problem, self.operator, self.block_unknowns = problem, rows.operator, rows.block_unknowns
-        self.method = choose_method(problem.model.solver.linear, problem.mesh.region_nodes, bool(list_options()))
+        self.method = choose_method(problem.model.solver.linear, problem.mesh.region_nodes, bool(list_factor_options()))
         nodes = problem.mesh.pairs.slave[eliminated]
         kept = np.ones(problem.unknowns, dtype=bool)
         kept.reshape(-1, 2)[nodes] = False

@@ -24,7 +24,7 @@ COMPACT_BYTES = 2048
 def create_group(parent: h5g.GroupID, name: str) -> h5g.GroupID:
     """A group that keeps all its attributes in its header: from the ninth on they would go elsewhere, and HDF5 1.10
     crashes when it copies texts from there."""
-    return h5g.create(parent, name.encode(), gcpl=_choose_group())
+    return h5g.create(parent, name.encode(), _choose_link(name.isascii()), _choose_group())
 
 
 class Columns:
@@ -49,21 +49,23 @@ class Columns:
         )
         properties = h5p.create(h5p.DATASET_CREATE)
         properties.set_virtual(_select_rows(shape), b".", self._name, self._taken)
-        h5d.create(parent, name.encode(), self._type, _make_rows(shape), properties)
+        h5d.create(parent, name.encode(), self._type, _make_rows(shape), properties, _choose_link(name.isascii()))
 
 
 def create_growing(
     parent: h5g.GroupID, name: str, shape: tuple[int, ...], kind: np.dtype[Any], rows: int
 ) -> h5d.DatasetID:
     """A dataset without entries, which are of this shape; so many are stored together."""
-    return h5d.create(parent, name.encode(), _find_type(kind), _make_rows(shape), _choose_chunks((rows, *shape)))
+    return h5d.create(parent, name.encode(), _find_type(kind), _make_rows(shape), _choose_chunks((rows, *shape)),
+                      _choose_link(name.isascii()))
 
 
 def create_array(parent: h5g.GroupID, name: str, values: NDArray[Any]) -> h5d.DatasetID:
     """A dataset that does not change."""
     small = 0 < values.nbytes <= COMPACT_BYTES
     dataset = h5d.create(
-        parent, name.encode(), _find_type(values.dtype), _make_space(values.shape), _choose_compact() if small else None
+        parent, name.encode(), _find_type(values.dtype), _make_space(values.shape),
+        _choose_compact() if small else None, _choose_link(name.isascii()),
     )
     if values.size:
         dataset.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values))
@@ -90,6 +92,16 @@ TEXT = h5py.string_dtype()
 
 
 # What many datasets have in common is made once; nothing changes it.
+
+
+@lru_cache
+def _choose_link(ascii_only: bool) -> h5p.PropLCID | None:
+    """A name with other characters is said to be UTF-8, which it is: other programs would read it as ASCII."""
+    if ascii_only:
+        return None
+    properties = h5p.create(h5p.LINK_CREATE)
+    properties.set_char_encoding(h5t.CSET_UTF8)
+    return properties
 
 
 @lru_cache

@@ -11,7 +11,7 @@ import pytest
 
 from pbem.results.layout import count_steps
 from pbem.results.opening import read_array
-from pbem.results.views import create_array, create_group, create_growing, set_attribute, set_texts
+from pbem.results.views import Columns, create_array, create_group, create_growing, set_attribute, set_texts
 
 
 @pytest.mark.parametrize("value", [
@@ -50,6 +50,22 @@ def test_rows_that_grow_are_those_of_h5py(shape: tuple[int, ...], tmp_path: Path
             each[1] = 7.0
         assert (mine.id.get_type(), mine.maxshape, mine.chunks) == (other.id.get_type(), other.maxshape, other.chunks)
         np.testing.assert_array_equal(mine[...], other[...])
+
+
+@pytest.mark.parametrize("name", ["seam", "Naht über"])
+def test_names_are_of_the_characters_that_h5py_says(name: str, tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_group("g").create_group(name)
+        source = Columns(create_growing(file.id, "source", (2,), np.dtype("f8"), 4))
+        for group, create in (
+            ("a", lambda parent: create_group(parent, name)),
+            ("b", lambda parent: create_growing(parent, name, (3,), np.dtype("f8"), 4)),
+            ("c", lambda parent: create_array(parent, name, np.arange(3))),
+            ("d", lambda parent: source.create_view(parent, name, 1)),
+        ):
+            create(create_group(file.id, group))
+            mine, other = (file.id.links.get_info(f"{each}/{name}".encode()).cset for each in (group, "g"))
+            assert mine == other, group
 
 
 @pytest.mark.parametrize("values", [

@@ -15,13 +15,10 @@ from pbem.mesh.elements import count_elements, divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
 from pbem.mesh.mesh import Links, Mesh, Pairs
 from pbem.mesh.mortar_pairs import describe_sparse_meshes
-from pbem.mesh.pairing import pair_nodes
+from pbem.mesh.pairing import JOINED, pair_nodes
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 from pbem.model.model import Model, Region
 from pbem.uniform import fold_uniform, repeat_value
-
-# The elements of so many curves are put together at a time: small arrays take more room than what is in them.
-JOINED = 256
 
 
 def generate_mesh(model: Model) -> Mesh:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -137,13 +137,12 @@ def choose_force_divisor(square: Real, shares: Real | None, smooth: float) -> fl
     return smooth if shares is None or not total > 0 else float(total / (square @ shares))
 
 
-def list_force_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
+def list_force_shares(model: Model, beside: Beside, smooth: float) -> Real:
     """Which part of the square of the difference is error (e,), on the elements of the run's mesh, whose model is
-    `model`; None where nothing tells of corners. At them it falls by r^FORCE_RATE where the second solution's elements
-    are r times as long, and with twice that power of the number of nodes of an element. smooth: what it is divided by
-    elsewhere.
+    `model`. At corners it falls by r^FORCE_RATE where the second solution's elements are r times as long, and with
+    twice that power of the number of nodes of an element. smooth: what it is divided by elsewhere.
     """
-    return _list_shares(model, beside, smooth, {end.curve: math.inf for end in list_corner_ends(model)})
+    return _list_shares(model, beside, smooth, lambda curve, power: 2 * power if power < WEAK else FORCE_RATE)
 
 
 def list_factor_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
@@ -151,25 +150,30 @@ def list_factor_shares(model: Model, beside: Beside, smooth: float) -> Real | No
     tell, and corners of cracks; None without. The errors there, and what they add elsewhere, fall by r^(2 lambda) for
     the power lambda of the distance.
     """
-    ends = list_corner_ends(model)
-    below = {end.curve: 1.0 if end.curve in model.crack_tips else WEAK for end in ends}
-    if all(end.power >= below[end.curve] for end in ends):
+
+    def find_rate(curve: str, power: float) -> float | None:
+        return 2 * power if power < (1.0 if curve in model.crack_tips else WEAK) else None
+
+    if all(find_rate(end.curve, end.power) is None for end in list_corner_ends(model)):
         return None
-    return _list_shares(model, beside, smooth, below)
+    return _list_shares(model, beside, smooth, find_rate)
 
 
-def _list_shares(model: Model, beside: Beside, smooth: float, below: Mapping[str, float]) -> Real | None:
-    """below: by curve; corners with this power or more are as anything else, infinite where all count."""
+def _list_shares(
+    model: Model, beside: Beside, smooth: float, find_rate: Callable[[str, float], float | None]
+) -> Real:
+    """find_rate: the power with which what comes from a corner falls, of its curve and the power of its jumps; None
+    where it is as anything else."""
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
     by = np.full(beside.fine.elements, 1 / smooth)
     for name, own in list_curve_elements(beside.model, beside.mesh):
         for element, ratio, power in at_corner.get(name, ()):
-            if power < below[name] or math.isinf(below[name]):
+            rate = find_rate(name, power)
+            if rate is not None:
                 at = fine[own[element]]
-                rate = 2 * power if power < WEAK or power < below[name] <= 1.0 else FORCE_RATE
                 by[at] = np.maximum(by[at], 1 / (_find_rise(beside, ratio, rate) - 1))
-    return np.asarray(by)
+    return by
 
 
 def _find_rise(beside: Beside, ratio: float, power: float) -> float:

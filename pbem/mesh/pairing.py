@@ -53,7 +53,8 @@ _LINK_TYPES: Mapping[str, type] = {
 }  # fmt: skip
 
 
-# Columns of so many parts, and elements of so many curves, are put together at a time: small arrays take more room than what is in them.
+# Columns of so many parts, and elements of so many curves, are put together at a time: small arrays take more room
+# than what is in them.
 JOINED = 256
 
 

@@ -118,11 +118,40 @@ def test_gaps_that_displacements_cannot_reach_are_not_searched_and_others_are(
     for shortcut in (True, False):
         if not shortcut:
             monkeypatch.setattr(closed_gaps, "_keep_least_distance", lambda *_: 0.0)
+            monkeypatch.setattr(closed_gaps, "_is_clear", lambda *_: False)
         for part in (1e-6, 0.01, 0.1, 0.3, 0.49, 0.6, 2.0):
             found = find_closed_gap(model, mesh, np.where(sides, -1j * part * width * np.sign(place.imag), 0j))
             depths.append(0.0 if found is None else found.depth)
     assert depths[:7] == depths[7:] and max(depths[:5]) == 0.0 < min(depths[5:7])
     assert 7 < len(searched) < 14  # of the smallest displacements nothing is looked for
+
+
+@pytest.mark.parametrize("slotted", [False, True])
+def test_thick_bodies_are_looked_at_once_and_slots_in_them_in_each_step(
+    slotted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a body 5 thick with elements shorter than its displacements; without a slot nothing can have closed."""
+    plate = """
+materials.rock = { young = 1e3, poisson = 0.25 }
+stages = [{ name = "load", steps = 1 }]
+curves.outline = { points = [[-2.5, -2.5], [2.5, -2.5], [2.5, 2.5], [-2.5, 2.5], [-2.5, -2.5]], elements = 300 }
+boundary.outline = { ux = 0.0, uy = 0.0 }
+"""
+    slot = """
+curves.slot = { points = [[-1, -0.05], [-1, 0.05], [1, 0.05], [1, -0.05], [-1, -0.05]], elements = [1, 10, 1, 13] }
+regions.plate = { material = "rock", boundary = ["outline", "slot"] }
+"""
+    model = parse_model(plate + (slot if slotted else slot[slot.index("regions") :].replace(', "slot"', "")))[1]
+    mesh = generate_mesh(model)
+    place = list_faces(mesh).position
+    searched = []
+    look = closed_gaps._look_across
+    monkeypatch.setattr(closed_gaps, "_look_across", lambda *given: searched.append(given) or look(*given))
+    for part in (0.3, 0.6, 0.9, 1.5):  # of half the slot's width
+        found = find_closed_gap(model, mesh, np.where(
+            np.abs(place) < 2, -0.1j * part * np.sign(place.imag), 0.06 * part * place.real))
+        assert (found is not None) == (slotted and part > 0.5)
+    assert len(searched) == 4 * slotted
 
 
 def test_a_seam_that_is_mined_closes_as_a_slot_does(tmp_path: Path) -> None:

@@ -21,6 +21,8 @@ ASIDE, MESH = 0.05, 1e-3
 FARTHEST = 3.0
 # Gaps are looked for around these parts of the largest one that displacements can close.
 AROUND = (0.0, *(0.5**k for k in range(10, -1, -1)))
+# That much more than displacements can close is looked at for sides that face each other, as they grow by steps.
+GENEROUS = 2.0
 # Displacements that are small beside the elements close no gap of the mesh: that is known of it once, from nodes as far
 # apart as the longest element, unless there are more pairs of these than so many a node.
 MOST_NEAR = 64
@@ -39,7 +41,7 @@ def find_closed_gap(model: Model, mesh: Mesh, displacement: Complex) -> Passing 
     if len(own) < 2:
         return None
     reach = 2 * float(np.abs(displacement[own] - displacement[own].mean()).max())
-    if FARTHEST * reach < _keep_least_distance(mesh, own):
+    if FARTHEST * reach < _keep_least_distance(mesh, own) or _is_clear(mesh, own, FARTHEST * reach):
         return None
     stretch, direction = (each[: mesh.nodes] for each in evaluate_stretch(mesh, displacement))
     across, gap = _look_across(mesh, own, reach)
@@ -102,6 +104,29 @@ def _find_least_distance(mesh: Mesh, own: Integer) -> float:
     toward, facing = position[other] - position[one], (normal[one] * np.conj(normal[other])).real
     found = (facing < -FACING) & ((toward * np.conj(normal[other])).real < 0)
     return float(np.abs(toward[found]).min(initial=most))
+
+
+def _is_clear(mesh: Mesh, own: Integer, reach: float) -> bool:
+    """Whether no two free nodes (of k) that face each other are so near to each other, ahead or behind.
+
+    Two normals n and m face each other if |n + m|^2 <= 2 - 2 FACING: of a node and all others, their normals turned
+    round and R times as long for a third and fourth coordinate, one is as near as sqrt(R^2 + (2 - 2 FACING) R^2) if one
+    of those that face it is as near as R. Most bodies are thicker than that: what is clear is remembered, as the search
+    for what is across takes twelve times as long, in each step.
+    """
+    known: dict[bytes, float] = mesh.keep("clear distances", lambda _: {})
+    key = own.tobytes()
+    if key not in known:
+        known.clear()  # those of a stage before
+        known[key] = 0.0
+    if reach > known[key] > -np.inf:
+        far = GENEROUS * reach
+        position, normal = mesh.position[own], far * mesh.normal[own]
+        tree = cKDTree(np.column_stack([position.real, position.imag, normal.real, normal.imag]))
+        ends = np.column_stack([position.real, position.imag, -normal.real, -normal.imag])
+        nearest = tree.query(ends, distance_upper_bound=far * np.sqrt(3 - 2 * FACING))[0]
+        known[key] = far if np.isinf(nearest).all() else -np.inf
+    return known[key] >= reach
 
 
 def _look_across(mesh: Mesh, own: Integer, reach: float) -> tuple[Integer, Real]:

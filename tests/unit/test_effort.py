@@ -69,6 +69,11 @@ def test_a_search_that_has_spent_its_effort_takes_newtons_steps_alone() -> None:
     search.conclude(search.pivot(problem, find))  # type: ignore[arg-type]
     assert left == [4 * ALWAYS, 2 * ALWAYS]
     assert search.is_spent() and follow(search, [1, 2], [3]) == [[], []]
+    # Not more than a part of what is left.
+    other = Search(50, most_effort=8 * ALWAYS)
+    for part in (0.5, 1.0):
+        other.pivot(problem, find, part)  # type: ignore[arg-type]
+    assert left[2:] == [4 * ALWAYS, 6 * ALWAYS]
     search.go_on_from_smoothed()
     assert search.is_spent()
     search.restart()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,11 @@ from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, StrengthG
 from pbem.contact.modes import Proposal, update_active_set
 from pbem.contact.running import Rest, find_running, run_on
 from pbem.contact.strength import slip_weakening
+from pbem.solve.nonlinear.running_group import MOST, RunningGroup
+from pbem.solve.nonlinear.search import Search
+from pbem.solve.problem.tangent import Settling
 from tests.unit.test_laws import make_laws, remember
+from tests.unit.test_search import propose
 
 Real = NDArray[np.float64]
 
@@ -115,3 +120,27 @@ def test_slip_before_the_step_has_weakened_the_faces() -> None:
 
 def test_pairs_that_run_on_are_those_whose_friction_changes_with_slip() -> None:
     assert find_running(make_subset(2, 1.0).laws).all() and not find_running(make_laws(2)).any()
+
+
+def test_pairs_beside_the_last_ones_run_on_where_all_that_changed_are_too_many() -> None:
+    count = 2 * MOST
+    subset = make_subset(count, 1.0)
+    interface = np.repeat([0, 1], [MOST + 203, count - MOST - 203])
+    problem = SimpleNamespace(
+        laws=subset.laws, mesh=SimpleNamespace(pairs=SimpleNamespace(interface=interface)))
+    tangent = SimpleNamespace(settling=Settling(MOST, with_neighbours=True, nearby=False))
+    running, search = RunningGroup(problem, tangent), Search(MOST)  # type: ignore[arg-type]
+    modes = ModeState(np.full(count, STICK, dtype=np.int8), np.ones(count))
+    groups = []
+    for changed in (range(MOST + 1), [5], [5], [MOST + 100], [MOST + 200], [MOST + 200]):
+        proposal = propose(list(changed), count)
+        search.note(proposal)
+        running.note(search, proposal, 0.0)
+        group = running.choose(search, modes)
+        groups.append(group.tolist())
+        if len(group):
+            running.conclude(group, True)
+    assert groups[:4] == [[]] * 3 + [[5, MOST + 100]]
+    # Four on either side, of the same interface; sixteen the next time.
+    assert groups[4] == sorted({5, *range(MOST + 96, MOST + 105), *range(MOST + 196, MOST + 203)})
+    assert groups[5] == sorted({*groups[4], *range(MOST + 184, MOST + 203)})

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from pbem.contact.laws import SLIP
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.solve.nonlinear.forcing import Forcing
-from pbem.solve.nonlinear.search import FUTILE, GLOBALISATIONS, LONG, Search, go_on_warily
+from pbem.solve.nonlinear.search import FUTILE, GLOBALISATIONS, LONG, MANY, Search, go_on_warily
 from tests.unit.test_laws import make_modes
 
 COUNT = 100
 
 
-def propose(changed: list[int]) -> Proposal:
-    violation = np.zeros(COUNT)
+def propose(changed: list[int], count: int = COUNT) -> Proposal:
+    violation = np.zeros(count)
     violation[changed] = 1.0
-    return Proposal(make_modes(SLIP, count=COUNT), violation)
+    return Proposal(make_modes(SLIP, count=count), violation)
 
 
 def follow(search: Search, *changes: list[int]) -> list[list[int]]:
@@ -213,6 +214,22 @@ def test_pairs_that_pivoting_is_not_made_for_are_met_with_caution_once_their_num
     for other in (few, Search(50, excluded=np.arange(COUNT) < 60)):
         follow(other, *(list(range(count)) for count in (40, 20, 9, 15, 30, 12, 10)))
         assert other.level == 0
+
+
+@pytest.mark.parametrize("varying", [False, True])
+def test_many_pairs_that_go_on_changing_each_other_are_met_with_caution(varying: bool) -> None:
+    def reach(*counts: int, smooths: bool = False) -> int:
+        search = Search(50, varying=varying, smooths=smooths)
+        for number in counts:
+            search.note(propose(list(range(number)), 10 * MANY))
+        return search.level
+
+    stalls = (900, 800, 850, 700, 600)
+    assert reach(*stalls[:4]) == 0 and reach(*stalls) == 1
+    # At the next level again, from the changes that there are.
+    assert reach(*stalls, 500, 400, 450, 300) == 1 and reach(*stalls, 500, 400, 450, 300, 390) == 2
+    # Not where their number falls, where pivoting can hold them, or where smoothed laws are asked.
+    assert reach(900, 800, 700, 600, 400) == reach(900, 800, 850, 700, MANY) == reach(*stalls, smooths=True) == 0
 
 
 def test_a_full_tangent_that_leads_away_gives_way_to_the_frozen_bound_until_that_is_nearer() -> None:

@@ -315,11 +315,15 @@ class Hold:
     def _stick_bonded(self, modes: ModeState) -> ModeState:
         return stick_bonded(self.problem.laws, self.memory, modes, self.settled)
 
-    def leaves_free(self, modes: ModeState, anchored: bool = False) -> bool:
+    def leaves_free(self, modes: ModeState, anchored: bool = False, laid: bool = False) -> bool:
         """Whether neither pairs nor anchors hold some body, or part of one, in given modes.
 
         anchored: by those anchors that act in the present solution: with other ones its responses are not theirs.
+        laid: but for bodies that were laid down in this step, and can be again.
         """
+        free = {motion.regions for motion in self.list_free(modes)} if laid and self.laid < MOST_LAID else set()
+        if free and free <= {(name,) for name in self.rested}:
+            return bool(self._find_cut_motions(modes))
         if anchored and self.acting is not None and not self._find_free_motions(modes).are_held_by(self.acting):
             return True
         return bool(self.find_free(modes) or self._find_cut_motions(modes))
@@ -333,8 +337,7 @@ class Hold:
         return describe_cut(self.problem, self._find_cut_motions(modes))
 
     def describe_floating(self, modes: ModeState) -> ConvergenceError | None:
-        """The error of a search that found no end as blocks were held that touch nothing in some place; None if none.
-        """
+        """The error of a search that found no end as blocks were held that touch nothing somewhere; None if none."""
         if self.state is None:
             return None
         mode = modes.mode.copy()

@@ -31,6 +31,9 @@ from pbem.solve.problem.tangent import Solved, TangentOperator
 SLOW, FALLING = 0.5, 0.1
 # Of models with so few pairs all run on together; of others so many at most.
 ALL, MOST = 100, 600
+# Of the operations that are left to a search a run may take this part: groups whose friction does not change with slip
+# have to be pivoted as well.
+PART = 0.5
 # Runs of a search at most, and those that find no state of rest.
 MOST_RUNS, MOST_FAILED = 12, 4
 
@@ -73,8 +76,10 @@ class RunningGroup:
             return nothing
         slides = np.flatnonzero((modes.mode == SLIP) & self._runs)
         before, lately = (np.unique(np.concatenate([slides, *each])) for each in (self.changed, self.changed[-2:]))
-        wide = np.flatnonzero(self._beside) if self._beside.sum() <= ALL else self._find_neighbours(before)
-        for pairs in (np.union1d(wide, before), before, lately, self.changed[-1]):
+        wide = np.flatnonzero(self._beside) if self._beside.sum() <= ALL else self._find_neighbours(before, self.runs)
+        # Where all that ever changed are too many, those beside the last ones: contact ends somewhere there.
+        around = (np.union1d(self._find_neighbours(lately, runs), lately) for runs in range(self.runs, 0, -1))
+        for pairs in (np.union1d(wide, before), before, *around, lately, self.changed[-1]):
             group = np.union1d(self.group, pairs)
             if len(group) <= MOST:
                 return group if len(group) > len(self.group) else nothing
@@ -85,12 +90,12 @@ class RunningGroup:
         self.runs, self.failed = self.runs + 1, self.failed + (not found)
         self.group = group if found else group[:0]
 
-    def _find_neighbours(self, pairs: Integer) -> Integer:
+    def _find_neighbours(self, pairs: Integer, runs: int) -> Integer:
         """The pairs next to some, the more the oftener groups ran on."""
-        if not self.runs or len(pairs) > MOST:
+        if not runs or len(pairs) > MOST:
             return pairs
         # The group has no room for more.
-        reach = min(4**self.runs, MOST)
+        reach = min(4**runs, MOST)
         near = pairs[:, None] + np.arange(-reach, reach + 1)
         inside = near.clip(0, len(self._interface) - 1)
         near = inside[(near == inside) & (self._interface[inside] == self._interface[pairs][:, None])]
@@ -128,6 +133,6 @@ def find_rest(
         )
         return found and Rest(complete(found.modes), spread(found.normal_traction), spread(found.slip))
 
-    found = search.pivot(problem, run)
+    found = search.pivot(problem, run, PART)
     running.conclude(group, found is not None)
     return found

@@ -95,6 +95,9 @@ LATE, LATEST = 16, 24
 ALIKE = 3
 # Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
 STALLED = 4
+# The same where more pairs than this change each time: others than those that were pivoted. With soft trial stiffnesses
+# they change each other less.
+MANY = 100
 
 
 class Search:
@@ -193,13 +196,14 @@ class Search:
         return True
 
     def _is_stalled(self) -> bool:
-        """Whether hardly fewer pairs change than before at this level, most of which pivoting is not made for."""
-        if not (self.varying and self.wary) or self.level == len(GLOBALISATIONS) - 1:
-            return False
-        if 2 * len(self.changed[-1]) > self.counts[-1]:
+        """Whether hardly fewer pairs change than before at this level: many, or most of which pivoting is not made for.
+        """
+        if self.level == len(GLOBALISATIONS) - 1:
             return False
         before, lately = np.split(self.counts[self.entered :], [-STALLED])
-        return bool(len(before) and lately.min() > SLOW * before.min())
+        many = not self.smooths and lately.min(initial=MANY + 1) > MANY
+        alone = self.varying and self.wary and 2 * len(self.changed[-1]) <= self.counts[-1]
+        return bool((many or alone) and len(before) and lately.min() > SLOW * before.min())
 
     def _enter(self, level: int) -> None:
         self.level, self.entered = level, len(self.counts)
@@ -243,11 +247,11 @@ class Search:
         """Whether pivoting has taken all that it may: Newton's steps go on alone, as many as are left."""
         return self.effort >= self.most_effort
 
-    def pivot(self, problem: Problem, find: Callable[[OperationCount], T]) -> T:
-        """What the first rank finds by pivoting, for all (see Problem.decide); problems may take what is left, and what
-        they took is counted here."""
+    def pivot(self, problem: Problem, find: Callable[[OperationCount], T], part: float = 1.0) -> T:
+        """What the first rank finds by pivoting, for all (see Problem.decide); problems may take that part of what is
+        left, and what they took is counted here."""
         def count() -> tuple[T, float]:
-            effort = OperationCount(self.most_effort - self.effort)
+            effort = OperationCount(part * (self.most_effort - self.effort))
             return find(effort), effort.taken
 
         found, taken = problem.decide(count)

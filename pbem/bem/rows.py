@@ -76,6 +76,18 @@ class Sources:
         vars(selected)["shape"] = self.shape  # the same nodes
         return selected
 
+    def cut(self, begin: int, end: int) -> Sources:
+        """The elements begin .. end - 1, which are not copied."""
+        start, finish, center, sweep, family, local = self.elements
+        some = slice(begin, end)
+        cut = Sources(
+            start[some], finish[some], family[some], self.local, self.kappa, self.shear_modulus, self.length,
+            center[some], sweep[some], self.crack_local,
+        )
+        vars(cut)["shape"] = self.shape
+        vars(cut)["elements"] = (cut.start, cut.end, cut.center, cut.sweep, cut.family, local)
+        return cut
+
 
 def evaluate_rows(
     sources: Sources,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import pbem
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
-from pbem.solve.preconditioner import schwarz
+from pbem.solve.preconditioner import group_inverses
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.step import Iteration, SilentReporter
 from pbem.solve.tangent.krylov import KrylovTangent
@@ -57,7 +57,7 @@ def small_groups(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
     monkeypatch.setattr(groups, "BODY_ELEMENTS", 16)
     monkeypatch.setattr(groups, "BODY_SHARE", 1.5)
-    monkeypatch.setattr(schwarz, "MOST_LEFT_OF_BODIES", 0)
+    monkeypatch.setattr(group_inverses, "MOST_LEFT_OF_BODIES", 0)
 
 
 def run(text: str, folder: Path, **petsc: str) -> tuple[pbem.Results, list[int]]:

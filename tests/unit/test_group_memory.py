@@ -16,7 +16,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.numbering import list_nodes, number_components
 from pbem.solve.preconditioner.elimination import eliminate_tractions
 from pbem.solve.preconditioner.inversion import invert_rows
-from pbem.solve.preconditioner.local_operator import LocalOperator
+from pbem.solve.preconditioner.local_operator import LocalOperator, Wanted
 from pbem.solve.preconditioner.near_map import take_near
 from tests.unit.case_sample import build
 from tests.unit.test_map_memory import SCALE, draw
@@ -46,9 +46,9 @@ def test_of_a_group_only_the_rows_that_are_wanted_are_held() -> None:
     less = eliminate_tractions(near, blocks, mesh.node_crack, np.abs(blocks).max())
     around = number_components(list_nodes(mesh, elements))
     left, rows = np.flatnonzero(~less.local.ravel()), np.flatnonzero(~less.first.ravel())
-    formed, most = measure_peak(lambda: local.form(elements, around, rows, left, near, less))
+    formed, most = measure_peak(lambda: local.form(Wanted(elements, around, rows, left), near, less))
     # They are those of the whole tangent operator, turned.
-    exact = local.form(elements, around, np.arange(len(around)), np.arange(len(around)), near, None)
+    exact = local.form(Wanted(elements, around, np.arange(len(around)), np.arange(len(around))), near, None)
     turned = np.einsum("nij,njk->nik", less.turn, exact.reshape(mesh.nodes, 2, -1)).reshape(exact.shape)
     np.testing.assert_allclose(formed, turned[np.ix_(rows, left)], rtol=0, atol=1e-12 * np.abs(exact).max())
     assert len(rows) < 0.8 * len(around)

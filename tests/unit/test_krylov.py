@@ -15,7 +15,7 @@ from pbem.model.model import Model, Operator
 from pbem.parallel import world
 from pbem.results.reader import Results
 from pbem.solve.petsc.session import petsc_options
-from pbem.solve.preconditioner import schwarz
+from pbem.solve.preconditioner import group_inverses
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.response import find_response
 from pbem.solve.problem.step import SilentReporter, Step
@@ -98,7 +98,7 @@ def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
     monkeypatch.setattr(groups, "GROUP_ELEMENTS", 24)
     monkeypatch.setattr(groups, "BODY_ELEMENTS", 16)
-    monkeypatch.setattr(schwarz, "MOST_LEFT_OF_BODIES", 150)
+    monkeypatch.setattr(group_inverses, "MOST_LEFT_OF_BODIES", 150)
 
 
 def read(text: str, operator: Operator = "hierarchical") -> Model:
@@ -288,7 +288,7 @@ def test_groups_take_in_more_around_them_where_gmres_is_slow(monkeypatch: pytest
     """Of a slender body divided into many groups; the same system then takes far fewer iterations."""
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
     monkeypatch.setattr(groups, "BODY_ELEMENTS", 12)
-    monkeypatch.setattr(schwarz, "MOST_LEFT_OF_BODIES", 0)
+    monkeypatch.setattr(group_inverses, "MOST_LEFT_OF_BODIES", 0)
     tangent = solve_once(SLENDER.replace("40", "80").replace("steps = 1", "steps = 1\norder = 1"))
     slow, so_far, problem = tangent.iterations[0], len(tangent.iterations), tangent.problem
     assert slow > 60

@@ -29,6 +29,20 @@ NOTHING = 1e-12
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """Rows and columns of the tangent operator of some elements (e,), rising, without the others.
+
+    places (k,): of the unknowns of these elements, rising, among those of a near map; rows, left: places in these,
+    rising, of the rows and the columns that are wanted.
+    """
+
+    elements: Integer
+    places: Integer
+    rows: Integer
+    left: Integer
+
+
+@dataclass(frozen=True)
 class _Part:
     """Elements of a region that are seen, rising, and what the constraint map makes of the entries of v there."""
 
@@ -56,46 +70,54 @@ class LocalOperator:
 
     def collect_free(self, nodes: Integer) -> sparse.csr_matrix:
         """The free terms (2 k, 4 n) in the equations of nodes (k,)."""
-        return collect_free_terms(self._mesh, nodes, self._scale(nodes))
+        return collect_free_terms(self._mesh, nodes, self.scale(nodes))
 
-    def _scale(self, nodes: Integer) -> Real:
+    def scale(self, nodes: Integer) -> Real:
+        """The factors (k,) of the equations of nodes (k,)."""
         return scale_equations(self._mesh, self._materials, self._length, nodes)
 
-    def form(
-        self, elements: Integer, around: Integer, rows: Integer, left: Integer, near: NearMap,
-        less: Elimination | None,
-    ) -> Real:
+    def is_plain(self, region: int) -> bool:
+        """Whether the rows of a region are those of the kernels, with nothing else: no anchors, nor a rigid body."""
+        held = region in self._anchors_of_region or any(motions.region == region for motions in self._rigid)
+        return self._materials[region].rigid is None and not held
+
+    def select(self, region: int, elements: Integer) -> Sources:
+        """Elements of a region, as the kernels see them."""
+        return self._sources[region].select(elements - self._first_element[region])
+
+    def form(self, wanted: Wanted, near: NearMap, less: Elimination | None) -> Real:
         """Turned rows of the tangent operator, and its columns that are left, of the nodes of elements, dense.
 
-        rows, left: places in around (k,), the unknowns of elements, rising; near, less: of their nodes, and of others.
+        near, less: of their nodes, and of others.
         """
-        columns = around[left]
-        if not len(columns):  # where all pairs stick nothing is left
+        elements, places, rows, left = wanted.elements, wanted.places, wanted.rows, wanted.left
+        if not len(left):  # where all pairs stick nothing is left
             return np.zeros((len(rows), 0))
-        node = around[rows] // 2
         assert (np.diff(rows) > 0).all() and (np.diff(left) > 0).all()
+        around = number_components(list_nodes(self._mesh, elements))
+        columns, node = around[left], rows // 2
         nodes, result = np.unique(node), np.empty((len(rows), len(left)))
-        parts = self._list_parts(elements, columns, near)
+        parts = self._list_parts(elements, places[left], near)
         # The rows of a rigid body are made all at once.
         rigid = any(self._materials[part.region].rigid is not None for part in parts)
         step = max(1, len(nodes)) if rigid else NODES_AT_ONCE
         for begin in range(0, len(nodes), step):
             some = nodes[begin : begin + step]
-            formed = self._form_nodes(some, columns, parts, near)
+            formed = self._form_nodes(around[2 * some] // 2, places[2 * some] // 2, columns, parts, near)
             if less is not None:
-                formed = (less.turn[near.find_nodes(some)] @ formed.reshape(len(some), 2, -1)).reshape(formed.shape)
+                formed = turn_rows(less, places[2 * some] // 2, formed)
             own = slice(*np.searchsorted(node, [some[0], some[-1] + 1]))
             if own.stop - own.start < len(formed):
-                formed = formed[np.searchsorted(number_components(some), around[rows[own]])]
+                formed = formed[np.searchsorted(number_components(some), rows[own])]
             result[own] = formed
         return result
 
     def _list_parts(self, elements: Integer, columns: Integer, near: NearMap) -> list[_Part]:
-        """What the unknowns `columns` (k,), rising, of elements move, region by region of the elements.
+        """What unknowns of elements move, at places `columns` (k,) of the near map, region by region of the elements.
 
         They also move nodes beyond, where the other side of a pair is in none of these groups.
         """
-        column, row, value = take_entries(near.columns, near.find(columns))
+        column, row, value = take_entries(near.columns, columns)
         sources = np.unique(row // 2 % self._mesh.nodes // self._per_element)
         parts = []
         for region in np.unique(self._mesh.region[elements]):
@@ -106,10 +128,15 @@ class LocalOperator:
                 parts.append(_Part(int(region), seen, combination))
         return parts
 
-    def _form_nodes(self, nodes: Integer, columns: Integer, parts: Sequence[_Part], near: NearMap) -> Real:
-        """Rows of the tangent operator of some nodes (k,), rising, on some of its columns: (2 k, columns)."""
+    def _form_nodes(
+        self, nodes: Integer, at: Integer, columns: Integer, parts: Sequence[_Part], near: NearMap
+    ) -> Real:
+        """Rows of the tangent operator of some nodes (k,), rising, on some of its columns: (2 k, columns).
+
+        at (k,): places of the nodes in the near map.
+        """
         formed = np.zeros((2 * len(nodes), len(columns)))
-        row, column, value = take_entries(near.free, near.find(number_components(nodes)))
+        row, column, value = take_entries(near.free, number_components(at))
         place, known = find_places(columns, column)
         formed[row[known], place[known]] = value[known]
         region = self._mesh.region[nodes // self._per_element]
@@ -148,7 +175,7 @@ class LocalOperator:
             at = np.concatenate([number_components(seen - first), count + number_components(seen - first)])
             return whole[np.ix_(number_components(nodes - first), at)], columns
         values = self._evaluate_rows(region, elements, nodes)
-        values *= -np.repeat(self._scale(nodes), 2)[:, None]
+        values *= -np.repeat(self.scale(nodes), 2)[:, None]
         for motions in self._rigid:
             place, there = find_places(columns, motions.columns)
             if motions.region == region and there.all():
@@ -167,7 +194,7 @@ class LocalOperator:
     def _evaluate_rows(self, region: int, elements: Integer, nodes: Integer) -> Real:
         """The kernels' rows of nodes, each with its own kind of equation, as `evaluate_unheld` scales them."""
         mesh = self._mesh
-        sources: Sources = self._sources[region].select(elements - self._first_element[region])
+        sources = self.select(region, elements)
         bounded = bool((sources.family == 0).any())
         place, there = find_places(elements, nodes // self._per_element)
         on, local, is_traction = np.where(there, place, -1), mesh.take_local(nodes), mesh.traction_equation[nodes]
@@ -212,6 +239,11 @@ class LocalOperator:
         on, functional = _look_up(self._anchors[other].nodes, self._anchors[other].functional, seen)
         where = np.ix_(number_components(at), number_components(on))
         values[where] += self._acting[one, other] * np.outer(split_components(pattern), split_components(functional))
+
+
+def turn_rows(less: Elimination, nodes: Integer, rows: Real) -> Real:
+    """Equations (2 k, n) of nodes, at places (k,) of a near map, turned."""
+    return (less.turn[nodes] @ rows.reshape(len(nodes), 2, -1)).reshape(rows.shape)
 
 
 def _look_up(

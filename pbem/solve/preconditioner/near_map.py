@@ -33,10 +33,6 @@ class NearMap:
         """Places, among those of the nodes here, of unknowns of the model, each of which is one of them."""
         return place_unknowns(self.own, self.beyond, unknowns)
 
-    def find_nodes(self, nodes: Integer) -> Integer:
-        """Places of nodes of the model likewise."""
-        return self.find(2 * nodes) // 2
-
     def take_blocks(self) -> Real:
         """The blocks (h, 2, 2) of every node's own unknowns in the free terms of its own equations."""
         entries = self.free.tocoo()

@@ -8,14 +8,12 @@ solution only the group's own part is used (restricted additive Schwarz: X.-C. C
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
 from scipy.linalg import lapack
 
-from pbem.arrays import Integer, Real, Single
-from pbem.bem.group_sizes import MOST_LEFT_OF_BODIES, MOST_TIMES
+from pbem.arrays import Integer, Real
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
@@ -25,38 +23,12 @@ from pbem.mesh.numbering import list_nodes, number_components
 from pbem.model.material import Material
 from pbem.parallel import largest_of_parts
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
-from pbem.solve.preconditioner.inversion import SINGULAR, find_norm, invert_rows
-from pbem.solve.preconditioner.local_operator import LocalOperator
+from pbem.solve.preconditioner.group_inverses import GroupInverses, LocalInverse
+from pbem.solve.preconditioner.inversion import SINGULAR, find_norm
+from pbem.solve.preconditioner.local_operator import LocalOperator, Wanted
 from pbem.solve.preconditioner.near_map import NearMap, take_near
-from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
+from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.system.halo import place_unknowns
-
-# Unknowns that are left in the matrix of a group of cracks and the nearest elements around it, at most.
-MOST_LEFT = 900
-# Models with so many unknowns keep the inverses of groups in single precision.
-SINGLE = 20_000
-
-
-@dataclass
-class LocalInverse:
-    """own: rows of the group's unknowns in this rank's vector; around: those of group and neighbours among the unknowns
-    of all nodes that the groups see, as of the residual that `apply` is given.
-
-    inside: places of the group's own unknowns in around; seen: those around, less what is eliminated. matrix
-    (solved, seen): rows of the local inverse, less what is eliminated within a node, of some of the own unknowns, on
-    turned equations; None where there is none.
-    formed: whether it has been tried; drift: by how much the constraint map has changed in what it sees since then.
-    """
-
-    group: Subdomain
-    own: Integer
-    around: Integer
-    inside: Integer
-    seen: Integer
-    solved: Integer
-    matrix: Real | Single | None = None
-    formed: bool = False
-    drift: float = 0.0
 
 
 class SchwarzPreconditioner:
@@ -68,6 +40,7 @@ class SchwarzPreconditioner:
     ) -> None:
         self._comm, self._mesh, self._nodes = comm, mesh, nodes
         self._local = LocalOperator(mesh, materials, length, anchors, rigid)
+        self._groups = GroupInverses(mesh, self._local)
         self._near: NearMap | None = None
         self._comparable = False  # whether inverses are those of the map, or of earlier ones with what has changed
         self._largest = 0.0  # free term of a node's own unknowns, of all the model
@@ -108,11 +81,9 @@ class SchwarzPreconditioner:
         self._comparable = False
 
     def _place(self, group: Subdomain) -> LocalInverse:
-        own = list_nodes(self._mesh, group.elements)
-        around = list_nodes(self._mesh, group.around)
-        inside = number_components(np.searchsorted(around, own))
+        own, around = (list_nodes(self._mesh, each) for each in (group.elements, group.around))
         seen = place_unknowns(self._nodes, self.beyond, number_components(around))
-        return LocalInverse(group, number_components(np.searchsorted(self._nodes, own)), seen, inside, inside, inside)
+        return self._groups.place(group, number_components(np.searchsorted(self._nodes, own)), seen)
 
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number.
@@ -120,15 +91,17 @@ class SchwarzPreconditioner:
         All ranks call this together, as `pass_over`.
         """
         change = self._take_map(constraints)
-        count, self.singular = 0, 0
+        changed: list[LocalInverse] = []
         with clock.piece("preconditioner"):
             for inverse in self.inverses:
                 inverse.drift += float(change[inverse.around].max())
                 if not inverse.formed or inverse.drift > self.most_drift:
-                    self._invert(inverse)
                     inverse.drift = 0.0
-                    count += 1
-        return count
+                    changed.append(inverse)
+            near, less = self._near, self._less
+            assert near is not None and less is not None
+            self.singular = self._groups.form(changed, near, less, self._widening)
+        return len(changed)
 
     def pass_over(self, constraints: ConstraintMap) -> None:
         """Take a constraint map without inverses, as others serve for it; `update` then forms all of them anew."""
@@ -214,53 +187,6 @@ class SchwarzPreconditioner:
         off = (less.inverse @ turned[..., None])[..., 0]
         return off.ravel(), np.where(less.first, 0.0, turned).ravel()
 
-    def _invert(self, inverse: LocalInverse) -> None:
-        """Form the rows of a group's inverse; what is eliminated is not in the factors, but follows from the rest."""
-        near, less = self._near, self._less
-        assert near is not None and less is not None
-        elements, inside = self._narrow(inverse, less)
-        around = number_components(list_nodes(self._mesh, elements))
-        places = near.find(around)
-        local, first = less.local.ravel()[places], less.first.ravel()[places]
-        inverse.seen = places[~first]
-        inverse.matrix, inverse.formed = None, True
-        if local.all():
-            inverse.matrix, inverse.solved = np.zeros((0, 0), dtype=np.float32), np.zeros(0, dtype=np.int64)
-            return
-        # In large groups the eliminated follow their own residual alone: what the others do to them GMRES sees in its
-        # next iteration, and no other equation contains them.
-        apart = len(inverse.group.nearest) > 0
-        own = np.zeros(len(around), dtype=bool)
-        own[inside] = not apart
-        rows = np.flatnonzero(~first | own)
-        left = np.flatnonzero(~local)
-        whole = self._local.form(elements, around, rows, left, near, less)
-        rest = ~first[rows]
-        # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
-        kept = np.flatnonzero(~local[inside])
-        inverse.solved = kept if apart else np.arange(len(inside))
-        wanted = np.zeros((len(inverse.solved), len(left)))
-        if not apart:
-            at = np.flatnonzero(~rest)
-            wanted[np.searchsorted(inside, rows[at])] = whole[at]
-            back = less.inverse[places[inside[::2]] // 2]
-            wanted = -(back @ wanted.reshape(len(back), 2, -1)).reshape(wanted.shape)
-        wanted[np.searchsorted(inverse.solved, kept), np.searchsorted(left, inside[kept])] = 1.0
-        if not rest.all():
-            whole = whole[rest]
-        # All groups together are much of what is stored: of large models in single precision.
-        single = len(around) < 2 * self._mesh.nodes >= SINGLE
-        matrix, found = invert_rows(
-            whole, wanted, lambda: self._local.form(elements, around, rows[rest], left, near, less), single
-        )
-        if matrix is not None:
-            stored: Real | Single = matrix if matrix.flags.c_contiguous else matrix.copy()
-            if single:
-                with np.errstate(over="ignore"):
-                    stored = stored.astype(np.float32)
-            inverse.matrix = stored if np.isfinite(stored).all() else None
-        self.singular += found > 0 or inverse.matrix is None
-
     def respond(
         self, constraints: ConstraintMap, offsets: ConstraintMap, elements: Integer, unknowns: Integer
     ) -> Real:
@@ -279,8 +205,9 @@ class SchwarzPreconditioner:
         wanted = np.zeros(len(around), dtype=bool)
         wanted[at] = True
         rows, left = np.flatnonzero(~first | wanted), np.flatnonzero(~local)
-        whole = self._local.form(elements, around, rows, left, near, less)
-        forces = self._local.form(elements, around, rows, at, moved, less)
+        places = np.arange(len(around))  # the maps are those of these nodes
+        whole = self._local.form(Wanted(elements, places, rows, left), near, less)
+        forces = self._local.form(Wanted(elements, places, rows, at), moved, less)
         rest = ~first[rows]
         result = np.zeros((len(around), len(at)))
         result[left] = -np.linalg.solve(whole[rest], forces[rest])
@@ -298,27 +225,27 @@ class SchwarzPreconditioner:
         Of the model the elements alone are there; constraints: those of `update`. (theory, 137)
         """
         all_nodes = list_nodes(self._mesh, elements)
-        around = number_components(all_nodes)
+        places = np.arange(2 * len(all_nodes))  # the maps are those of these nodes
         asked = number_components(np.searchsorted(all_nodes, nodes))
         at = np.sort(asked)
-        other = np.ones(len(around), dtype=bool)
+        other = np.ones(len(places), dtype=bool)
         other[at] = False
         # The elements can be those of other ranks.
         near, loose = (self.take_near(each, all_nodes) for each in (constraints, free))
         less = self._eliminate(near, near.take_blocks())
         # What is eliminated of the others is in no other equation.
         rows, left = np.flatnonzero(other & ~less.first.ravel()), np.flatnonzero(other & ~less.local.ravel())
-        block = self._local.form(elements, around, at, at, loose, None)
+        block = self._local.form(Wanted(elements, places, at, at), loose, None)
         if len(left):
-            matrix = self._local.form(elements, around, rows, left, near, less)
+            matrix = self._local.form(Wanted(elements, places, rows, left), near, less)
             size = find_norm(matrix)
             # The transposed matrix is factorised where it is: a copy would be a hundred megabytes.
             factors, pivots, zero = lapack.dgetrf(matrix.T, overwrite_a=True)
             if zero or not lapack.dgecon(factors, size)[0] > SINGULAR:
                 return None
-            forces = self._local.form(elements, around, rows, at, loose, less)
+            forces = self._local.form(Wanted(elements, places, rows, at), loose, less)
             follows = lapack.dgetrs(factors, pivots, forces, trans=1)[0]
-            block -= self._local.form(elements, around, at, left, near, None) @ follows
+            block -= self._local.form(Wanted(elements, places, at, left), near, None) @ follows
         place = np.searchsorted(at, asked)
         return np.asarray(block[np.ix_(place, place)])
 
@@ -330,27 +257,6 @@ class SchwarzPreconditioner:
         around = list_nodes(self._mesh, elements)
         asked = number_components(np.searchsorted(around, nodes))
         at = np.sort(asked)
-        formed = self._local.form(elements, number_components(around), at, at, near, None)
+        formed = self._local.form(Wanted(elements, near.find(number_components(around)), at, at), near, None)
         place = np.searchsorted(at, asked)
         return formed[np.ix_(place, place)]
-
-    def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer]:
-        """Elements of a group and around it, few enough; and the places of the own unknowns among theirs."""
-        group = inverse.group
-        if not len(group.nearest):
-            return group.around, inverse.inside
-        own, width = group.elements, 2 * (self._mesh.order + 1)
-        left = (~less.local).reshape(-1, width).sum(axis=1)
-        of_own, of_nearest = (left[self._place_elements(each)] for each in (own, group.nearest))
-        sums = of_own.sum() + np.cumsum(of_nearest)
-        least = MOST_LEFT if self._mesh.crack[own].all() else MOST_LEFT_OF_BODIES
-        most = max(least, MOST_TIMES * of_own.sum()) * self._widening
-        most = min(most, max(MOST_AROUND, MOST_TIMES * of_own.sum()))
-        elements = np.union1d(own, group.nearest[sums <= most])
-        around = list_nodes(self._mesh, elements)
-        return elements, number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
-
-    def _place_elements(self, elements: Integer) -> Integer:
-        """Places of elements among those of the own nodes and of the nodes beyond, which are of whole elements."""
-        width = 2 * (self._mesh.order + 1)
-        return place_unknowns(self._nodes, self.beyond, width * elements) // width

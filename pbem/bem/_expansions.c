@@ -2,12 +2,13 @@
  * cluster, down the trees, to values at points. Only geometry is stored; pbem/bem/farfield.py calls them.
  *
  * series.h moves coefficients between clusters, ends.h makes them and evaluates them. The formulas are those of
- * pbem/pages/theory.md, section 6. tied_blocks.h has the products of what is near, combinations.h what near rows and the
- * laws of pairs make of each other.
+ * pbem/pages/theory.md, section 6. packing.h has the entries of near rows that are weak, tied_blocks.h the products
+ * of these, combinations.h what near rows and the laws of pairs make of each other.
  */
 #include "buffers.h"
 #include "combinations.h"
 #include "ends.h"
+#include "packing.h"
 #include "tied_blocks.h"
 
 static int check_terms(Py_ssize_t terms)
@@ -253,6 +254,8 @@ static PyMethodDef methods[] = {
     {"evaluate", py_evaluate, METH_VARARGS, evaluate_doc},
     {"add_combined", py_add_combined, METH_VARARGS, combined_doc},
     {"combine_pairs", py_combine_pairs, METH_VARARGS, pairs_doc},
+    {"compare_columns", py_compare_columns, METH_VARARGS, compare_doc},
+    {"pack_columns", py_pack_columns, METH_VARARGS, pack_doc},
     {NULL, NULL, 0, NULL},
 };
 

@@ -23,7 +23,7 @@ from pbem.bem import _expansions
 WEAK, WEAK_BY_TOLERANCE = 0.03, 1e6
 # Models of fewer unknowns keep all entries in full.
 LARGE = 20_000
-LARGEST = 2.0**31 - 1
+LARGEST = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -106,27 +106,26 @@ def pack_rows(rows: Integer, columns: Integer, near: Real, width: int, displacem
     """
     if not weak or not near.size:
         return LeafRows(rows, columns, near)
-    size = np.abs(near)
+    near = np.ascontiguousarray(near)
     packed, strong = [], np.ones(len(columns), dtype=bool)
     for own in (columns < displacements, columns >= displacements):
-        chosen = _find_weak(size, columns, own, width, weak)
+        chosen = _find_weak(near, columns, own, width, weak)
         if not len(chosen):
             continue
-        unit = np.maximum(size[:, chosen].max(axis=1) / LARGEST, np.finfo(float).tiny)
-        number = np.ascontiguousarray(np.rint(near[:, chosen] / unit[:, None]), dtype=np.int32)
+        unit, number = np.empty(len(near)), np.empty((len(near), len(chosen)), dtype=np.int32)
+        _expansions.pack_columns(near, chosen, unit, number, LARGEST)
         packed.append(WeakRows(columns[chosen], number, unit))
         strong[chosen] = False
-    return LeafRows(rows, columns[strong], np.ascontiguousarray(near[:, strong]), tuple(packed))
+    return LeafRows(rows, columns[strong], near.take(strong.nonzero()[0], axis=1), tuple(packed))
 
 
-def _find_weak(size: Real, columns: Integer, own: Bool, width: int, weak: float) -> Integer:
-    """Numbers of the columns among some of whose elements all entries are weak in all rows."""
+def _find_weak(near: Real, columns: Integer, own: Bool, width: int, weak: float) -> Integer:
+    """Numbers of the columns among some, which are side by side, of whose elements all entries are weak in all rows."""
     at = np.flatnonzero(own)
     if not len(at):
         return at
-    largest = size[:, at].max(axis=1)
-    part = (size[:, at] / np.where(largest > 0, largest, 1.0)[:, None]).max(axis=0)
     element = columns[at] // width
-    begin = np.flatnonzero(np.diff(element, prepend=-1))
-    of_element = np.maximum.reduceat(part, begin)
-    return at[np.repeat(of_element, np.diff(np.append(begin, len(at)))) < weak]
+    begin = at[0] + np.append(np.flatnonzero(np.diff(element, prepend=-1)), len(at))
+    part = np.empty(len(begin) - 1)
+    _expansions.compare_columns(near, begin, part, len(near))
+    return at[np.repeat(part < weak, np.diff(begin))]

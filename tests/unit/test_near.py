@@ -92,3 +92,24 @@ def test_what_is_cleared_is_given_back() -> None:
     result = np.zeros(ROWS)
     near.add(np.ones(VALUES), result)
     assert not result.any()
+
+
+@pytest.mark.parametrize("row", [0, 5])
+def test_what_is_no_number_is_kept_as_it_is(row: int) -> None:
+    """As a whole number it would be one, and products would not show it."""
+    near = np.random.default_rng(9).normal(size=(8, 60)) * np.repeat(10.0 ** -np.arange(10.0), 6)
+    assert pack_rows(np.arange(8), np.arange(60), near, 6, 60, 0.03).weak
+    near[row, 57] = np.nan
+    packed = pack_rows(np.arange(8), np.arange(60), near, 6, 60, 0.03)
+    assert np.array_equal(np.isnan(packed.apply(np.ones(60))), np.arange(8) == row)
+
+
+@pytest.mark.parametrize("column", [-1, 13])
+def test_columns_that_are_not_there_are_not_packed(column: int) -> None:
+    near, unit, number = np.ones((2, 12)), np.empty(2), np.empty((2, 1), dtype=np.int32)
+    with pytest.raises(IndexError, match="argument 1"):
+        _expansions.pack_columns(near, np.array([column]), unit, number, 2**31 - 1)
+    with pytest.raises(ValueError, match="numbers of up to"):
+        _expansions.pack_columns(near, np.array([0]), unit, number, 2**31)
+    with pytest.raises(IndexError, match="argument 1"):
+        _expansions.compare_columns(near, np.array([0, column]), np.empty(1), 2)

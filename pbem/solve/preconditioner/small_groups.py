@@ -128,6 +128,8 @@ class SmallGroups:
         """
         mesh, width, regions = self._mesh, self._width, self._regions
         column, row, value = take_entries(near.columns, asked.places[asked.left])
+        if not len(row):
+            return
         element, group = row // 2 % mesh.nodes // (width // 2), asked.group_of_column[column]
         key, inverse = np.unique(group * mesh.elements + element, return_inverse=True)
         area = key // mesh.elements * regions + mesh.region[key % mesh.elements]

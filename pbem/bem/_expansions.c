@@ -157,9 +157,10 @@ end:
 
 PyDoc_STRVAR(carry_doc,
 "carry(target, source, target_center, target_radius, length, source_center, source_radius, weights, moments, fields,\n"
-"      terms)\n\n"
-"Add to the fields of targets (n,) what the coefficients of the sources (n,) make there. length: unit of the logarithm\n"
-"of each target cluster; weights (r, terms + 1): see pbem/bem/expansion.py, and rows of zeros up to a multiple of 4.");
+"      terms, source_terms, target_terms)\n\n"
+"Add to the fields of targets (n,) what the coefficients of the sources (n,) make there; so many terms of both count.\n"
+"length: unit of the logarithm of each target cluster; weights (target_terms + 1, source_terms + 1): see\n"
+"pbem/bem/expansion.py, and rows of zeros up to a multiple of 4.");
 
 enum { TARGET, SOURCE, TARGET_CENTER, TARGET_RADIUS, UNIT, SOURCE_CENTER, SOURCE_RADIUS, WEIGHTS, MOMENTS, FIELDS,
        CARRY_BUFFERS };
@@ -168,16 +169,22 @@ static PyObject *py_carry(PyObject *Py_UNUSED(self), PyObject *args)
 {
     Buffers all;
     PyObject *result = NULL;
-    if (!take_buffers(&all, args, CARRY_BUFFERS, 1)) goto end;
+    if (!take_buffers(&all, args, CARRY_BUFFERS, 3)) goto end;
     const Py_buffer *b = all.b;
     const Py_ssize_t terms = take_number(args, CARRY_BUFFERS), size = 2 * (terms + 1);
+    const Py_ssize_t seen = take_number(args, CARRY_BUFFERS + 1), kept = take_number(args, CARRY_BUFFERS + 2);
     const Py_ssize_t pairs = b[TARGET].len / (Py_ssize_t)sizeof(int64_t);
     const Py_ssize_t targets = b[TARGET_CENTER].len / (Py_ssize_t)sizeof(cplx);
     const Py_ssize_t sources = b[SOURCE_CENTER].len / (Py_ssize_t)sizeof(cplx);
-    if (!check_terms(terms) || !has_items(&all, SOURCE, pairs, sizeof(int64_t)) ||
+    if (!check_terms(terms) || !check_terms(seen) || !check_terms(kept)) goto end;
+    if (seen > terms || kept > terms) {
+        PyErr_Format(PyExc_ValueError, "%zd and %zd terms of %zd", seen, kept, terms);
+        goto end;
+    }
+    if (!has_items(&all, SOURCE, pairs, sizeof(int64_t)) ||
         !has_items(&all, TARGET_RADIUS, targets, sizeof(double)) || !has_items(&all, UNIT, targets, sizeof(double)) ||
         !has_items(&all, SOURCE_RADIUS, sources, sizeof(double)) ||
-        !has_items(&all, WEIGHTS, (terms / WEIGHED + 1) * WEIGHED * (terms + 1), sizeof(double)) ||
+        !has_items(&all, WEIGHTS, (kept / WEIGHED + 1) * WEIGHED * (seen + 1), sizeof(double)) ||
         !has_items(&all, MOMENTS, size * sources, sizeof(cplx)) ||
         !has_items(&all, FIELDS, size * targets, sizeof(cplx)) || !are_within(&all, TARGET, 0, targets) ||
         !are_within(&all, SOURCE, 0, sources))
@@ -194,7 +201,7 @@ static PyObject *py_carry(PyObject *Py_UNUSED(self), PyObject *args)
             const int64_t t = target[begin + j], s = source[begin + j];
             each[j] = (Carried){moments + s * size, fields + t * size, to[t] - from[s], other[s], own[t], length[t]};
         }
-        carry_series(each, count, b[WEIGHTS].buf, (int)terms);
+        carry_series(each, count, b[WEIGHTS].buf, (int)terms, (int)seen, (int)kept);
     }
     Py_END_ALLOW_THREADS
     result = Py_NewRef(Py_None);

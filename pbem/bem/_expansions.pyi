@@ -10,7 +10,8 @@ def sum_moments(
 def lift(parent: Any, center: Any, radius: Any, moments: Any, terms: int, /) -> None: ...
 def carry(
     target: Any, source: Any, target_center: Any, target_radius: Any, length: Any, source_center: Any,
-    source_radius: Any, weights: Any, moments: Any, fields: Any, terms: int, /,
+    source_radius: Any, weights: Any, moments: Any, fields: Any, terms: int,
+    source_terms: int, target_terms: int, /,
 ) -> None: ...
 def lower(parent: Any, wanted: Any, center: Any, radius: Any, fields: Any, terms: int, /) -> None: ...
 def evaluate(

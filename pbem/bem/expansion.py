@@ -48,9 +48,10 @@ def far_weights(terms: int) -> Real:
 
 
 @cache
-def _pad_weights(terms: int) -> Real:
-    """The same with rows of zeros, up to a multiple of WEIGHED."""
-    return np.concatenate([far_weights(terms), np.zeros((-(terms + 1) % WEIGHED, terms + 1))])
+def _pad_weights(seen: int, kept: int) -> Real:
+    """The same (kept + 1, seen + 1) with rows of zeros, up to a multiple of WEIGHED."""
+    weights = far_weights(max(seen, kept))[: kept + 1, : seen + 1]
+    return np.concatenate([weights, np.zeros((-(kept + 1) % WEIGHED, seen + 1))])
 
 
 @dataclass(frozen=True)
@@ -169,16 +170,16 @@ def lift(forest: Branches, moments: Complex) -> None:
 
 def carry(
     targets: Circles, length: Real, target: Integer, sources: Circles, source: Integer, moments: Complex,
-    fields: Complex,
+    fields: Complex, terms: tuple[int, int],
 ) -> None:
     """Add to the fields of targets what the coefficients of sources that are far from them make there (theory, 40).
 
-    target, source (n,): pairs of clusters; length (targets,): unit of the logarithm.
+    target, source (n,): pairs of clusters; length (targets,): unit of the logarithm; terms: those of the
+    sources, and those of the fields, that count.
     """
-    terms = moments.shape[2] - 1
     _expansions.carry(
-        target, source, targets.center, targets.radius, length, sources.center, sources.radius, _pad_weights(terms),
-        moments, fields, terms,
+        target, source, targets.center, targets.radius, length, sources.center, sources.radius, _pad_weights(*terms),
+        moments, fields, moments.shape[2] - 1, *terms,
     )  # fmt: skip
 
 

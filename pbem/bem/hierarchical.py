@@ -30,7 +30,7 @@ from pbem.bem.rigid_region import form_rigid_rows
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.bem.seen_entries import SeenEntries, take_elements
 from pbem.bem.sharing import Share
-from pbem.bem.tree import Forest, build_forest, find_interactions
+from pbem.bem.tree import RATIO, Forest, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
@@ -39,8 +39,6 @@ from pbem.model.material import Material
 LEAF_ELEMENTS = 8
 # A region of so few elements is one leaf: what is near is all of it.
 SMALL_REGION = 48
-# By this factor at least the errors of expansions fall from term to term.
-RATIO = 0.55
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ from pbem.arrays import Complex, Integer, Real
 from pbem.bem.expansion import FieldPoints
 from pbem.bem.farfield import SourceTree, TargetTree, see_sources
 from pbem.bem.hierarchical import (
-    RATIO,
     HierarchicalOperator,
     Sorted,
     list_columns,
@@ -26,7 +25,7 @@ from pbem.bem.rigid_motions import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.seen_entries import take_elements
 from pbem.bem.sharing import keep_whole
-from pbem.bem.tree import Forest, Interactions, build_forest, find_interactions
+from pbem.bem.tree import RATIO, Forest, Interactions, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
 from pbem.model.material import Material

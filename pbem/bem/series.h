@@ -179,7 +179,7 @@ INLINE void add_both(cplx *first, cplx *second, Four value)
 }
 
 /* The fields far from the sources, added to those of one pair's target. */
-INLINE void add_far(const Carried *pair, const Powers *power, int j, double (*far)[COLUMNS], int terms)
+INLINE void add_far(const Carried *pair, const Powers *power, int j, double (*far)[COLUMNS], int terms, int used)
 {
     const cplx *own = pair->moments, back = conj(pair->distance) / pair->distance;
     cplx *phi = pair->field, *psi = pair->field + terms + 1;
@@ -193,9 +193,9 @@ INLINE void add_far(const Carried *pair, const Powers *power, int j, double (*fa
     }
     /* psi about the target: plus conj(distance) phi' */
     const Four straight = {0, 0, creal(back), creal(back)}, crossed = {0, 0, -cimag(back), cimag(back)};
-    for (int l = 0; l <= terms; l++) {
+    for (int l = 0; l <= used; l++) {
         Four value = load_four(far[l] + 4 * j);
-        if (l < terms) {
+        if (l < used) {
             const Four next = load_four(far[l + 1] + 4 * j) * (double)(l + 1);
             value += SHUFFLE_FOUR(next, next, 0, 1, 0, 1) * straight + SHUFFLE_FOUR(next, next, 1, 0, 1, 0) * crossed;
         }
@@ -203,9 +203,10 @@ INLINE void add_far(const Carried *pair, const Powers *power, int j, double (*fa
     }
 }
 
-/* Fields about the targets from the coefficients of the sources, added (theory, 40). weights: with rows of zeros up to
- * a multiple of WEIGHED. Real and imaginary parts of both functions of each pair are side by side. */
-static void carry_series(const Carried *pairs, int count, const double *weights, int terms)
+/* Fields about the targets from the coefficients of the sources, added (theory, 40): of all terms that there are so many
+ * of the fields from so many of the sources. weights: of those, with rows of zeros up to a multiple of WEIGHED. Real and
+ * imaginary parts of both functions of each pair are side by side. */
+static void carry_series(const Carried *pairs, int count, const double *weights, int terms, int sources, int fields)
 {
     double seen[MOST_POWERS][COLUMNS], far[MOST_POWERS + WEIGHED][COLUMNS];
     cplx inner[PAIRS] = {0}, outer[PAIRS] = {0};
@@ -214,18 +215,18 @@ static void carry_series(const Carried *pairs, int count, const double *weights,
         inner[j] = pairs[j].source / pairs[j].distance;
         outer[j] = pairs[j].target / pairs[j].distance;
     }
-    if (count < PAIRS) memset(seen, 0, (terms + 1) * sizeof seen[0]);
-    take_powers_of_pairs(&power, inner, terms);
+    if (count < PAIRS) memset(seen, 0, (sources + 1) * sizeof seen[0]);
+    take_powers_of_pairs(&power, inner, sources);
     for (int j = 0; j < count; j++)
-        for (int k = 0; k <= terms; k++) {
+        for (int k = 0; k <= sources; k++) {
             const Four both = load_both(pairs[j].moments + k, pairs[j].moments + terms + 1 + k);
             const Four value = multiply_both(both, power.re[k][j], power.im[k][j]);
             *(FourLoose *)(seen[k] + 4 * j) = value;
         }
-    for (int l = 0; l <= terms; l += WEIGHED)
-        weigh_rows(weights + l * (terms + 1), (const double (*)[COLUMNS])seen, terms, far + l);
-    take_powers_of_pairs(&power, outer, terms);
-    for (int j = 0; j < count; j++) add_far(&pairs[j], &power, j, far, terms);
+    for (int l = 0; l <= fields; l += WEIGHED)
+        weigh_rows(weights + l * (sources + 1), (const double (*)[COLUMNS])seen, sources, far + l);
+    take_powers_of_pairs(&power, outer, fields);
+    for (int j = 0; j < count; j++) add_far(&pairs[j], &power, j, far, terms, fields);
 }
 
 #endif

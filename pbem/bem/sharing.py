@@ -34,8 +34,11 @@ class Ranks(Protocol):
     def rank(self) -> int:
         """Number of this one."""
 
-    def find_ghosts(self, numbers: Integer, owner: Integer, own: Integer) -> Ghosts:
-        """Ghosts of numbers (g,) owned by other ranks (g,); own (k,), rising: this rank's. By all ranks together."""
+    def find_ghosts(self, numbers: Integer, owner: Integer, own: Integer, kept: Bool | None = None) -> Ghosts:
+        """Ghosts of numbers (g,) owned by other ranks (g,); own (k,), rising: this rank's. By all ranks together.
+
+        kept (g, w): which values of each ghost are sent; those that are not are zero. None: all of them.
+        """
 
     def add_up(self, part: Real) -> Real:
         """The sum of all ranks' arrays of the same shape; by all ranks together."""
@@ -79,7 +82,7 @@ class OneRank:
 
     rank = 0
 
-    def find_ghosts(self, numbers: Integer, owner: Integer, own: Integer) -> Ghosts:
+    def find_ghosts(self, numbers: Integer, owner: Integer, own: Integer, kept: Bool | None = None) -> Ghosts:
         """None."""
         assert not len(numbers), "one rank owns everything"
         return _NoGhosts()

@@ -14,6 +14,8 @@ from pbem.arrays import Bool, Complex, Integer, Real
 # Places and circles that differ by less than this part of their cluster, or of their size, are alike: trees of regular
 # models are the same in all units.
 ROUNDED = 2.0**-30
+# By this factor at least the errors of expansions fall from term to term.
+RATIO = 0.55
 
 
 class Circles(Protocol):

@@ -93,8 +93,8 @@ def _count_dense(model: Model, mesh: Mesh, needed: np.ndarray) -> tuple[float, f
 
 def _count_hierarchical(model: Model, mesh: Mesh, needed: np.ndarray) -> tuple[float, float]:
     """Entries of near blocks, and of the groups' inverses (about as many)."""
-    from pbem.bem.hierarchical import RATIO, choose_terms, sort_elements  # here, as most models are small
-    from pbem.bem.tree import find_interactions
+    from pbem.bem.hierarchical import choose_terms, sort_elements  # here, as most models are small
+    from pbem.bem.tree import RATIO, find_interactions
 
     terms = choose_terms(model.solver.tolerance)
     parts = sort_elements(mesh, [region.material for region in model.regions], terms)

@@ -201,10 +201,12 @@ def apply_l2l(fields: Complex, shift: Complex, offset: Complex, outer: Real) -> 
     return result
 
 
-def apply_m2l(moments: Complex, distance: Complex, source: Real, target: Real, length: Real) -> Complex:
+def apply_m2l(
+    moments: Complex, distance: Complex, source: Real, target: Real, length: Real, kept: int | None = None
+) -> Complex:
     """Fields (n, 2, p + 1) about targets from coefficients of sources; distance: from source to target centre.
 
-    source, target: radii of the circles; length: unit of the logarithm.
+    source, target: radii of the circles; length: unit of the logarithm; kept: terms of the fields, if not all.
     (theory, 40)
     """
     terms = moments.shape[-1] - 1
@@ -213,6 +215,7 @@ def apply_m2l(moments: Complex, distance: Complex, source: Real, target: Real, l
     ratio = target / distance
     result = (seen.reshape(-1, terms + 1) @ far_weights(terms).T.astype(complex)).reshape(moments.shape)
     result[:, :, 0] += np.log(distance / length)[:, None] * moments[:, :, 0]
+    result[:, :, terms + 1 if kept is None else kept + 1 :] = 0
     # psi about the target: plus conj(distance) phi'; coefficients are still in units of the distance here
     result[:, 1, :-1] += (np.conj(distance) / distance)[:, None] * number[1:] * result[:, 0, 1:]
     return result * (ratio[:, None] ** number)[:, None, :]

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from pbem.bem.farfield import count_terms, mark_ancestors
 from pbem.bem.hierarchical import (
     Anchoring,
     HierarchicalOperator,
@@ -21,8 +22,10 @@ from pbem.bem.pointwise import place_points
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.seen_entries import take_elements
 from pbem.bem.sharing import Ghosts, OneRank, Share, keep_whole
+from pbem.bem.tree import RATIO, find_interactions
 from pbem.contact.anchor import anchor_motions
 from pbem.contact.loads import collect_outer_nodes, find_needed_columns
+from pbem.mesh.numbering import list_nodes
 from pbem.model.rigid_body_modes import find_rigid_body_modes
 from tests.unit.far_sample import TEXTS, Sample, list_vectors, make_sample, read_sample, shrink_leaves
 
@@ -132,9 +135,11 @@ class OneOfThree(OneRank):
     def __init__(self, rank: int) -> None:
         self.rank = rank
 
-    def find_ghosts(self, numbers: np.ndarray, owner: np.ndarray, own: np.ndarray) -> Ghosts:
+    def find_ghosts(
+        self, numbers: np.ndarray, owner: np.ndarray, own: np.ndarray, kept: np.ndarray | None = None
+    ) -> Ghosts:
         assert (owner != self.rank).all()
-        return super().find_ghosts(numbers[:0], owner[:0], own)
+        return super().find_ghosts(numbers[:0], owner[:0], own, kept)
 
 
 def test_leaves_shared_by_ranks_add_up() -> None:
@@ -153,6 +158,41 @@ def test_leaves_shared_by_ranks_add_up() -> None:
     assert (owners == 1).all()
     whole = sources.collect(take_elements(v, sources.elements, sources.width))
     np.testing.assert_allclose(together, whole, rtol=0, atol=1e-13 * np.abs(whole).max())
+
+
+class Asked(OneOfThree):
+    """Keeps the numbers that were asked for, and which values of them."""
+
+    def __init__(self, rank: int) -> None:
+        super().__init__(rank)
+        self.asked: list[tuple[np.ndarray, np.ndarray | None]] = []
+
+    def find_ghosts(
+        self, numbers: np.ndarray, owner: np.ndarray, own: np.ndarray, kept: np.ndarray | None = None
+    ) -> Ghosts:
+        self.asked.append((numbers, kept))
+        return super().find_ghosts(numbers, owner, own, kept)
+
+
+def test_of_others_clusters_a_rank_asks_for_the_coefficients_that_its_pairs_use() -> None:
+    sample = make_sample("cracks")
+    mesh, ranks = sample.mesh, Asked(1)
+    share = Share(ranks, np.arange(mesh.elements) * 3 // mesh.elements)
+    parts, _ = sample.sort(1e-8)
+    sources = prepare_sources(parts, sample.needed, share)
+    own = list_nodes(mesh, np.flatnonzero(share.own))
+    ranks.asked.clear()
+    operator = assemble_hierarchical(parts, sources, own, sample.needed, sample.model.size)
+    (numbers, kept), forest = ranks.asked[0], parts.forest
+    met = find_interactions(forest, forest, RATIO, mark_ancestors(forest, operator.targets.clusters.number))
+    expected = np.zeros((forest.clusters, 2, parts.terms + 1, 2), dtype=bool)
+    for target, source in zip(met.far_target.tolist(), met.far_source.tolist(), strict=True):
+        if sources.owner[source] != 1:
+            used = count_terms(forest, np.array([target]), forest, np.array([source]), parts.terms)[0, 0]
+            expected[source, :, : used + 1] = True
+    np.testing.assert_array_equal(np.flatnonzero(expected.any(axis=(1, 2, 3))), numbers)
+    np.testing.assert_array_equal(expected[numbers].reshape(len(numbers), -1), kept)
+    assert len(numbers) and kept is not None and kept.mean() < 0.9
 
 
 @pytest.mark.parametrize("every", [1, 2])

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from pbem.bem.expansion import FieldPoints, carry, lift, lower, place_densities
+from pbem.bem.farfield import count_terms
 from pbem.bem.hierarchical import assemble_hierarchical, choose_terms, name_media, prepare_sources, sort_elements
 from pbem.bem.near import LeafRows, choose_weak, pack_rows
 from pbem.bem.operator import assemble_rows
 from pbem.bem.seen_entries import take_elements
 from pbem.bem.sharing import keep_whole
-from pbem.bem.tree import build_forest, find_interactions
+from pbem.bem.tree import RATIO, build_forest, find_interactions
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -88,13 +89,24 @@ def test_passes_between_clusters_are_those_of_the_formulas(terms: int) -> None:
     np.testing.assert_allclose(lifted, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
     length = np.full(targets.clusters, 7.0)
     fields = np.zeros((targets.clusters, *shape), dtype=complex)
-    carry(targets, length, met.far_target, sources, met.far_source, moments, fields)
+    carry(targets, length, met.far_target, sources, met.far_source, moments, fields, (terms, terms))
     expected = np.zeros_like(fields)
     np.add.at(expected, met.far_target, apply_m2l(
         moments[met.far_source], targets.center[met.far_target] - sources.center[met.far_source],
         sources.radius[met.far_source], targets.radius[met.far_target], length[met.far_target],
     ))  # fmt: skip
     np.testing.assert_allclose(fields, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    for seen, kept in ((terms // 3 + 1, terms), (terms, terms // 2 + 1), (max(1, terms - 1), max(1, terms - 2))):
+        some = np.zeros_like(fields)
+        carry(targets, length, met.far_target, sources, met.far_source, moments, some, (seen, kept))
+        expected = np.zeros_like(fields)
+        # One more term of fields is there before the series of psi is moved than after: it is left out.
+        left = moments[met.far_source] * (np.arange(terms + 1) <= seen)
+        np.add.at(expected, met.far_target, apply_m2l(
+            left, targets.center[met.far_target] - sources.center[met.far_source],
+            sources.radius[met.far_source], targets.radius[met.far_target], length[met.far_target], kept,
+        ))  # fmt: skip
+        np.testing.assert_allclose(some, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
     wanted = np.arange(targets.clusters) % 5 > 0
     moved = fields.copy()
     lower(targets, wanted, moved)
@@ -106,6 +118,30 @@ def test_passes_between_clusters_are_those_of_the_formulas(terms: int) -> None:
         if wanted[child]:
             expected[child] += apply_l2l(expected[[parent]], matrix, step, targets.radius[[parent]])[0]
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("terms", [12, 20, 31])
+def test_pairs_far_apart_lose_no_more_by_fewer_terms_than_those_just_apart(terms: int) -> None:
+    """Against three times as many; sources as large as there can be in their circle, values on the target's rim."""
+    random = np.random.default_rng(terms)
+    targets, sources, met = make_trees(random)
+    used = count_terms(targets, met.far_target, sources, met.far_source, terms)
+    assert used.max() == terms and (used < terms).mean() > 0.5 and (used >= 1).all()
+    phase = np.exp(2j * np.pi * random.random((sources.clusters, 2, 3 * terms + 1)))
+    rim = np.exp(2j * np.pi * np.arange(40) / 40)
+    lost = np.zeros(used.shape[1])
+    for pair, (target, source, count) in enumerate(zip(met.far_target, met.far_source, used.T, strict=True)):
+        values = []
+        for each in (tuple(count.tolist()), (3 * terms, 3 * terms)):
+            fields = np.zeros((targets.clusters, 2, 3 * terms + 1), dtype=complex)
+            one = np.array([target]), sources, np.array([source])
+            carry(targets, np.ones(targets.clusters), *one, phase, fields, each)
+            own = fields[target, 0]
+            slope = (own[1:] * np.arange(1, 3 * terms + 1)) @ rim ** np.arange(3 * terms)[:, None]
+            size = np.abs(targets.center[target] - sources.center[source]) / targets.radius[target]
+            values.append((own @ rim ** np.arange(3 * terms + 1)[:, None], slope / terms * size))
+        lost[pair] = max(np.abs(one - other).max() for one, other in zip(*values, strict=True))
+    assert lost.max() <= 1.01 * lost[(used == terms).any(axis=0)].max() < 2 * RATIO**terms
 
 
 @pytest.mark.parametrize("count", [1, 3, 4, 9])
@@ -152,9 +188,13 @@ def test_arguments_of_wrong_lengths_are_refused() -> None:
     targets, sources, met = make_trees(np.random.default_rng(0))
     moments = np.zeros((sources.clusters, 2, 8), dtype=complex)
     with pytest.raises(ValueError, match="bytes, expected"):
-        carry(targets, np.ones(3), met.far_target, sources, met.far_source, moments, np.zeros_like(moments))
+        carry(targets, np.ones(3), met.far_target, sources, met.far_source, moments, np.zeros_like(moments), (7, 7))
     with pytest.raises(ValueError, match="terms; expected 1 to"):
         lift(sources, np.zeros((sources.clusters, 2, 200), dtype=complex))
+    length, fields = np.ones(targets.clusters), np.zeros((targets.clusters, 2, 8), dtype=complex)
+    for used, fault in (((8, 7), "8 and 7 terms of 7"), ((7, 0), "0 terms; expected 1 to")):
+        with pytest.raises(ValueError, match=fault):
+            carry(targets, length, met.far_target, sources, met.far_source, moments, fields, used)
     mesh, materials, _ = make_mesh("cracks", 2)
     densities = place_densities(mesh, np.arange(3), 5, np.ones(3))
     kappa, modulus = name_media(sort_elements(mesh, materials, 5), np.zeros(1, dtype=np.int64))
@@ -180,7 +220,7 @@ def test_numbers_of_what_is_not_there_are_refused(at: int) -> None:
     for target, source in ((move(met.far_target, targets.clusters), met.far_source),
                            (met.far_target, move(met.far_source, sources.clusters))):
         with pytest.raises(IndexError, match="argument"):
-            carry(targets, length, target, sources, source, moments, fields)
+            carry(targets, length, target, sources, source, moments, fields, (terms, terms))
     wrong = replace(sources, parent=np.where(sources.parent < 0, -2 if at < 0 else sources.clusters, sources.parent))
     with pytest.raises(IndexError, match="expected -1 to"):
         lift(wrong, moments)

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.bem.farfield import mark_ancestors
-from pbem.bem.hierarchical import RATIO, sort_elements
-from pbem.bem.tree import Forest, Interactions, build_forest, find_interactions
+from pbem.bem.hierarchical import sort_elements
+from pbem.bem.tree import RATIO, Forest, Interactions, build_forest, find_interactions
 from tests.identities.bodies import ROCK, Body, mesh_body
 
 Complex = NDArray[np.complex128]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.bem.sharing import Ghosts, Share
 from pbem.parallel import add_up, keep_duplicate
 
@@ -24,20 +24,30 @@ class _Arriving:
     order: Integer
     requests: list[MPI.Request]
     sent: Real
+    kept: Bool | None = None
 
     def finish(self) -> Real:
         """The ghosts' values, in the ghosts' order."""
         MPI.Request.Waitall(self.requests)
-        result = np.empty_like(self.values)
-        result[self.order] = self.values
+        values = self.values
+        if self.kept is not None:
+            values = np.zeros(self.kept.shape)
+            values[self.kept] = self.values
+        result = np.empty_like(values)
+        result[self.order] = values
         return result
 
 
 class Halo:
     """See pbem.bem.sharing.Ghosts. Only ranks that need something of each other send messages."""
 
-    def __init__(self, comm: MPI.Intracomm, numbers: Integer, owner: Integer, own: Integer) -> None:
-        """Ghosts of numbers (g,), none of them twice, of their owners (g,); own (k,), rising: this rank's items."""
+    def __init__(
+        self, comm: MPI.Intracomm, numbers: Integer, owner: Integer, own: Integer, kept: Bool | None = None
+    ) -> None:
+        """Ghosts of numbers (g,), none of them twice, of their owners (g,); own (k,), rising: this rank's items.
+
+        kept (g, w): see pbem.bem.sharing.Ranks; not for values that are added to the owners'.
+        """
         self._comm = comm
         self._order = np.argsort(owner, kind="stable")
         taken = np.bincount(owner, minlength=comm.size).astype(np.int64)
@@ -50,10 +60,20 @@ class Halo:
         found = own[np.minimum(self._give, len(own) - 1)] if len(own) else np.full(len(asked), -1)
         assert np.array_equal(found, asked), "a rank is asked for what it does not own"
         self._givers, self._takers = _list_ranges(taken), _list_ranges(given)
+        self._kept: Bool | None = None
+        if kept is not None:
+            width = kept.shape[1]
+            self._kept, self._asked = kept[self._order], np.empty((len(asked), width), dtype=bool)
+            comm.Alltoallv([self._kept.view(np.uint8), width * taken], [self._asked.view(np.uint8), width * given])
+            self._sent_to = _count_values(self._takers, self._asked)
+            self._sent_by = _count_values(self._givers, self._kept)
 
     def start(self, values: Real) -> _Arriving:
         """See pbem.bem.sharing.Ghosts."""
-        return self._send(values[self._give], self._takers, self._givers, len(self._order))
+        if self._kept is None:
+            return self._send(values[self._give], self._takers, self._givers, len(self._order))
+        sent, count = values[self._give][self._asked], int(self._kept.sum())
+        return replace(self._send(sent, self._sent_to, self._sent_by, count), kept=self._kept)
 
     def add_to_owners(self, ghosts: Real, values: Real) -> None:
         """See pbem.bem.sharing.Ghosts; in the order of the ranks, so that sums are the same in every run."""
@@ -78,6 +98,12 @@ def _list_ranges(counts: Integer) -> list[tuple[int, int, int]]:
     return [(int(rank), int(last[rank] - counts[rank]), int(last[rank])) for rank in np.flatnonzero(counts)]
 
 
+def _count_values(items: list[tuple[int, int, int]], kept: Bool) -> list[tuple[int, int, int]]:
+    """Ranges of the values that are kept (k, w) for ranges of items."""
+    last = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
+    return [(rank, int(last[begin]), int(last[end])) for rank, begin, end in items]
+
+
 @dataclass(frozen=True)
 class AllRanks:
     """See pbem.bem.sharing.Ranks."""
@@ -89,9 +115,9 @@ class AllRanks:
         """See pbem.bem.sharing.Ranks."""
         return int(self.comm.rank)
 
-    def find_ghosts(self, numbers: Integer, owner: Integer, own: Integer) -> Halo:
+    def find_ghosts(self, numbers: Integer, owner: Integer, own: Integer, kept: Bool | None = None) -> Halo:
         """See pbem.bem.sharing.Ranks."""
-        return Halo(self.comm, numbers, owner, own)
+        return Halo(self.comm, numbers, owner, own, kept)
 
     def add_up(self, part: Real) -> Real:
         """See pbem.bem.sharing.Ranks."""

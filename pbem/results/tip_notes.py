@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +25,8 @@ MOST_NAMES = 8
 ENDS = ("start", "end")
 # K of a tip with an elastic joint is right within 2 % on elements of this part of E' over its stiffness, by the order.
 MOST_OF_ZONE = (0.01, 0.15, 0.6, 1.5)
+# Joints nearer than this part of their largest closure to it are as stiff as there: no mesh resolves them.
+MOST_CLOSED = 1e-3
 ALONG = "a crack along an interface ends there, whose field oscillates if the materials differ; J is what it releases"
 
 
@@ -37,8 +41,9 @@ def _find_stiff_joints(results: Results) -> list[str]:
     if not len(results.steps) or not results.tips:
         return []
     stored = json.loads(results.configuration or "{}").get("interfaces", {})
-    joints = {name: [stored.get(name, {}).get("law", {}).get(f"{which}_stiffness") or 0.0
-                     for which in ("normal", "tangential")] for name in results.tips}
+    laws = {name: stored.get(name, {}).get("law", {}) for name in results.tips}
+    joints = {name: [law.get(f"{which}_stiffness") or 0.0 for which in ("normal", "tangential")]
+              for name, law in laws.items()}
     if not any(any(each) for each in joints.values()):
         return []
     found, ends = [], _find_crack_ends(results)
@@ -47,10 +52,12 @@ def _find_stiff_joints(results: Results) -> list[str]:
     bounds = np.searchsorted(pairs.interface, np.arange(len(pairs.names) + 1))
     beside = {name: (first, last - 1) for name, first, last in zip(pairs.names, bounds, bounds[1:], strict=False)}
     for name, tips in results.tips.items():
-        if name not in ends:
+        if name not in ends or not any(joints[name]):
             continue
+        stiffening = _measure_stiffening(results, name, laws[name])
         for at, length in enumerate(ends[name].lengths):
-            stiff = max((joint for joint, K in zip(joints[name], (tips.KI, tips.KII), strict=True)
+            present = (joints[name][0] * stiffening[at], joints[name][1])
+            stiff = max((joint for joint, K in zip(present, (tips.KI, tips.KII), strict=True)
                          if np.nan_to_num(K[-1, at])), default=0.0)
             # Open faces carry nothing.
             if not is_open[beside[name][at]] and stiff * length > allowed * tips.plane_modulus:
@@ -60,10 +67,25 @@ def _find_stiff_joints(results: Results) -> list[str]:
     found.sort()
     names = list_names([name for _, name in found], MOST_NAMES)
     return [
-        f"K, J and T at {names} are too small: elements there are up to {1 / found[0][0]:.3g} times as long as E' over "
+        f"K, J and T at {names} are off: elements there are up to {1 / found[0][0]:.3g} times as long as E' over "
         "the stiffness of the elastic joint, the distance from the tip within which it takes up the stress; K is right "
         f"within 2 % with elements of less than {allowed:g} times that distance (order {results.nodes.order})."
     ]
+
+
+def _measure_stiffening(results: Results, name: str, law: Mapping[str, Any]) -> tuple[float, float]:
+    """How many times as stiff as at first a joint is on the elements at both ends of its crack, at the last stored
+    step: where it has closed by v of its largest closure V by (1 - v/V)^-2 (theory, 112)."""
+    largest = law.get("parameters", {}).get("closure")
+    if law.get("kind") != "barton_bandis" or not largest:
+        return 1.0, 1.0
+    contact = results.contact[name]
+    closed_by = -contact.opening[-1]
+    if "dilation" in contact.internal:  # slip has pushed the faces apart
+        closed_by = closed_by + contact.internal["dilation"][-1]
+    times = (1 - np.clip(closed_by / largest, 0.0, 1 - MOST_CLOSED)) ** -2
+    per_element = results.nodes.order + 1
+    return float(times[:per_element].max()), float(times[-per_element:].max())
 
 
 def compare_release(results: Results) -> list[str]:

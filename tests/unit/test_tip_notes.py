@@ -10,7 +10,7 @@ import pytest
 import pbem
 from pbem.results.describe import describe_results
 from pbem.results.lazy import Contact
-from pbem.results.tip_notes import compare_release
+from pbem.results.tip_notes import compare_release, doubt_factors
 from pbem.solve.problem.step import SilentReporter
 
 CASE = """
@@ -73,3 +73,21 @@ def test_contacts_of_large_networks_are_not_read_one_by_one(tmp_path: Path, monk
     results = pbem.open_results(tmp_path / "case.h5")
     assert compare_release(results) == notes
     assert "traction" not in vars(results)  # of all steps: of many and large ones there would be no room for it
+
+
+@pytest.mark.parametrize(("largest", "is_named"), [(5e-4, True), (1.0, False)])
+def test_joints_that_have_stiffened_as_they_closed_are_told(largest: float, is_named: bool, tmp_path: Path) -> None:
+    """On 16 elements K of the joint that has nearly closed is 2 % off, on 64 and as long as it is soft it is right."""
+    case = {
+        "materials": {"rock": {"young": 1.0, "poisson": 0.2}},
+        "curves": {"crack": {"points": [[-1, 0], [1, 0]], "elements": 16, "grading": "none"}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}},
+        "interfaces": {"crack": {"law": "barton_bandis", "residual_friction_angle": 30.0, "jrc": 5.0, "jcs": 0.1,
+                                 "normal_stiffness": 2.0, "closure": largest}},
+        "remote": {"syy": -2e-3}, "analysis": {"steps": 1},
+    }  # fmt: skip
+    few = pbem.run(case, tmp_path / "few.h5")
+    many = pbem.run(case, tmp_path / "many.h5", set={"curves.crack.elements": 64})
+    assert (few.tips["crack"].KI[-1, 0] / many.tips["crack"].KI[-1, 0] - 1 > 0.015) == is_named
+    assert any("elastic joint" in note for note in doubt_factors(few)) == is_named
+    assert not any("elastic joint" in note for note in doubt_factors(many))

@@ -236,7 +236,7 @@ class Comparison:
         return np.maximum(of_zones, self._stuck_ends.bound(replace(step, contact=contact)))
 
     def _bound_factors(self, contact: ContactState, jumps: Real) -> Real:
-        """The least error (cracks, 1) of the factors of each crack for the errors (i,) of the interfaces' jumps."""
+        """The least error (cracks, 2) of the factors of each crack for the errors (i,) of the interfaces' jumps."""
         KI, KII = self._rules.evaluate_factors(contact)
         number = {name: i for i, name in enumerate(sort_pairs(self._mesh))}
         least = np.zeros((len(self._model.crack_tips), 1))
@@ -245,7 +245,7 @@ class Comparison:
             largest = max(_largest(contact.opening[own] - self._gap[own]), _largest(contact.slip[own]))
             factor = max(_largest(KI[crack]), _largest(KII[crack]))
             least[crack] = self._least_factor_error * jumps[number[name]] / largest * factor if largest > 0 else 0.0
-        return least
+        return least if self._as_they_are else np.fmax(least, self._rules.bound_short(KI, KII)[: len(least)])
 
     def _subtract_pairs(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real, Real, Real]:
         """Per interface (i,): estimated errors, of opening and slip the largest, of the tractions the mean ones."""

@@ -33,6 +33,8 @@ ON_ELEMENT = 10
 MOST_DEGREE = 5
 # A straight crack turns by less than this (radians), and leaves its line by less than this part of its length.
 STRAIGHT = 1e-6
+# So few elements from a tip to where other cracks meet the crack see little of the field between them.
+MOST_SHORT = 2
 # Stress along a crack is smooth up to where the crack turns by more (radians), or changes its curvature by more per
 # distance from the tip.
 BENT = 1e-2
@@ -55,6 +57,11 @@ class TipForms:
     def __init__(self, shape: TipShape) -> None:
         self._shape = shape
         self._limited: dict[int, tuple[Real, Complex, Real]] = {}
+
+    @property
+    def is_short(self) -> bool:
+        """Whether at most MOST_SHORT elements lie between the tip and where other cracks or a face meet the crack."""
+        return not self._shape.whole and self._shape.elements.count <= MOST_SHORT
 
     @cached_property
     def intensity(self) -> Real:

@@ -32,6 +32,9 @@ MOST_WHOLE = 100
 UNEVEN = 0.1
 # Cracks whose elements are the same to this part of their lengths share their forms.
 ALIKE = 1e-9
+# Of K, by the order, where few elements lie between the tip and what meets the crack: two solutions see the field there
+# alike.
+SHORT_ERROR = (0.1, 0.02, 5e-3, 2e-3)
 # Laws of faces whose tractions follow the jump; those of others do with elastic joints, or weakening by slip.
 MOVING = ("cohesive", "barton_bandis", "custom")
 
@@ -81,6 +84,15 @@ class TipRules:
         """Take the forms of groups that were derived elsewhere, for the same model and mesh."""
         for number, forms in derived.items():
             self.groups[number].forms.take(forms)
+
+    def bound_short(self, KI: Real, KII: Real) -> Real:
+        """The least errors of K (cracks, 2), by K as of `evaluate_factors`: not zero where few elements lie between a
+        tip and what meets the crack."""
+        short = np.zeros(len(self.is_tip), dtype=bool)
+        for group in self.groups:
+            short[group.tip] = group.forms.is_short
+        largest = np.fmax(np.abs(KI), np.abs(KII))
+        return np.where(short.reshape(-1, 2), SHORT_ERROR[self.mesh.order] * largest, 0.0)
 
     def evaluate(self, contact: ContactState) -> dict[str, tuple[Real, Real]]:
         """KI and KII (2,) of every crack at its start and its end, as in `evaluate_factors`."""

@@ -17,9 +17,10 @@ class AnalysisTable(Table):
         "SST",
         description='the integral equation collocated on each face. `"SST"`: displacement everywhere; `"DBEM"`: '
         'traction on the second side of contacts; `"HST"`: traction on both sides; `"THST"`: traction everywhere. '
-        "Elements at corners and ends of contact keep the displacement equation; so do faces beside cracks and narrow "
-        "slots and, with DBEM and HST, parts of a contact's curves without an opposite face. Cracks always have the "
-        "dual pair; narrow slots keep the displacement equation on one face",
+        "Elements at corners and ends of contact, and opposite a contact's blunt corners, keep the displacement "
+        "equation; so do faces beside cracks and narrow slots and, with DBEM and HST, parts of a contact's curves "
+        "without an opposite face. Cracks always have the dual pair; narrow slots keep the displacement equation on "
+        "one face",
     )
     order: Annotated[int, Field(strict=True, ge=0, le=3)] = Field(2, description="polynomial order of an element")
     tips: Flag = Field(True, description="crack-tip elements with square-root shapes")

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from pbem.geometry.curve import Curve
+from pbem.mesh.contact_kinks import find_elements_at_kinks
 from pbem.model.beside_cracks import LegNumber, find_legs_beside_cracks
 from pbem.model.model import Model, Region
 from pbem.model.sight import Strip, find_strips
@@ -26,14 +29,15 @@ class Equations:
 
 
 def choose_equations(model: Model) -> Equations:
-    """What the scheme asks for, but for four exceptions.
+    """What the scheme asks for, but for five exceptions.
 
     A rigid motion of a closed inner curve produces nothing in the region outside it through the traction equation, so
     that an inner loop always keeps the displacement equation; with DBEM the side across it takes the traction equation.
     Traction equations on both faces of a narrow slot say nearly the same: there one of the faces keeps the displacement
     equation, as on the faces of a crack; both do on the faces of a thin part, which a traction equation hardly bends.
     The same holds for faces beside a crack of the region, or beside a slot.
-    Elements at corners, ends of contact and changes of condition keep the displacement equation, see `_keep_ends`.
+    Elements at corners, ends of contact and changes of condition keep the displacement equation, see `_keep_ends`; so
+    do those of contacts at blunt corners or opposite them, where displacements have a kink, see `contact_kinks`.
     """
     inner = find_inner_curves(model)
     traction: dict[tuple[int, str], tuple[bool, ...]] = {}
@@ -60,6 +64,9 @@ def choose_equations(model: Model) -> Equations:
     elements = {
         (number, curve): _keep_ends(model.curves[curve], legs) for (number, curve), legs in traction.items()
     }
+    at_kinks = find_elements_at_kinks(model) if any(map(any, elements.values())) else {}
+    for key in [key for key in elements if key[1] in at_kinks]:
+        elements[key] = tuple((np.array(elements[key]) & ~at_kinks[key[1]]).tolist())
     lost = dict.fromkeys(curve for (number, curve), legs in traction.items()
                          if any(legs) and not any(elements[number, curve]))  # fmt: skip
     if len(notes) > MOST_NOTES:

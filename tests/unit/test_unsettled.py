@@ -16,6 +16,7 @@ from tests.unit.test_nearby import draw_modes
 from tests.unit.test_sweeps import assemble, write_network
 
 WRONG = np.array([True, False])
+ROCK = 'residual_friction_angle = 28.0, jrc = 10.0, jcs = 50.0'
 WEAKENING = "friction = 0.4, cohesion = 0.1, friction_dynamic = 0.3, slip_distance = 1e-3"
 
 
@@ -76,10 +77,13 @@ def test_where_friction_weakens_cohesion_is_blamed_for_pairs_that_part(law: str,
     ("friction = 0.4", 0.0, False),
     ("friction = 0.0", 0.3, False),
     ('friction = 0.4, pressurised = "all"', 0.3, False),
+    (ROCK, 0.3, True),
+    (f'{ROCK}, pressurised = "all"', 0.3, False),
 ])  # fmt: skip
 def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, fluid: float, rough: bool) -> None:
     """Faces part at a compression of the pressure, where friction times the pressure holds closed ones."""
-    problem = assemble(write_network(teeth=2, law=law))
+    text = write_network(teeth=2, law=law)
+    problem = assemble(text.replace('law = "coulomb"', 'law = "barton_bandis"') if "jrc" in law else text)
     count = problem.mesh.pairs.count
     pressure = np.full(count, fluid)
     assert (find_friction_under_fluid(problem.laws, pressure) == rough).all()

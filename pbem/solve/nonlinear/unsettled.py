@@ -126,8 +126,9 @@ def find_friction_under_fluid(laws: PairLaws, pressure: Real) -> Bool:
     alone: they lose it there, and have it back where they meet."""
     rough = np.zeros(laws.count, dtype=bool)
     for group in laws.strengths:
-        rough[group.pairs] = group.parameters.get("friction", 0.0) > 0
-    return rough & (pressure > 0) & ~laws.fluid_inside & find_linear(laws)
+        by_stress = group.parameters.get("residual_friction_angle", 0.0) > 0  # of rock joints, whatever has slipped
+        rough[group.pairs] = (group.parameters.get("friction", 0.0) > 0) & find_linear(laws)[group.pairs] | by_stress
+    return rough & (pressure > 0) & ~laws.fluid_inside
 
 
 def _blame_loss(

@@ -334,3 +334,13 @@ def test_units_of_length_do_not_matter(size: float) -> None:
         u, t = v[: len(v) // 2], v[len(v) // 2 :]
         found = operator.apply(np.concatenate([size * u, t])) / size
         np.testing.assert_allclose(found, plain.apply(v), rtol=0, atol=1e-12 * measure_parts(plain, v), err_msg=kind)
+
+
+def test_no_points_have_no_values() -> None:
+    """As of a rank that owns no crack."""
+    sample = make_sample("cracks")
+    parts, sources = sample.sort(1e-8)
+    none = np.zeros(0, dtype=np.int64)
+    rows = place_points(parts, sources, none.astype(complex), none, none, none.astype(float))
+    v = list_vectors(sample)["random displacements"]
+    assert rows.displacement(v).shape == (0,) and rows.stress(v).shape == (0, 3)

@@ -31,7 +31,7 @@ from pbem.mesh.parts import Parts, find_parts
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import RigidBodyMode, find_plane_translations
 from pbem.model.support_motions import Motion
-from pbem.parallel import do_on_first, gather_parts, norm_of_parts
+from pbem.parallel import do_on_first, norm_of_parts
 from pbem.solve.problem.tangent import TangentOperator
 
 T = TypeVar("T")
@@ -82,10 +82,7 @@ class System(Protocol):
         """Free what `apply` alone needs, where that is much; it is not called any more."""
 
     def recover(self, v: Real) -> Real:
-        """This rank's part of the mean displacement of both faces at the crack nodes, by components.
-
-        The parts of all ranks, one after the other, are those of all crack nodes in mesh order.
-        """
+        """Mean displacement of both faces at all crack nodes in mesh order, by components; on every rank."""
 
     def make_tangent(self, problem: Problem) -> TangentOperator:
         """The tangent operator K = B M of the problem whose system it is."""
@@ -137,7 +134,7 @@ class Problem:
 
     @cached_property
     def all_crack_nodes(self) -> Integer:
-        """The crack nodes of all ranks, in the order in which their recovered displacements are gathered."""
+        """The crack nodes of all ranks, in the order of their recovered displacements."""
         return np.flatnonzero(self.mesh.node_crack)
 
     @cached_property
@@ -268,7 +265,7 @@ class Problem:
 
         (theory, 13)
         """
-        whole = gather_parts(self.comm, self.system.recover(v - load.known))
+        whole = self.system.recover(v - load.known)
         return whole[0::2] + 1j * whole[1::2] + load.fields.take_particular(self.all_crack_nodes)
 
     def make_tangent(self) -> TangentOperator:

@@ -20,7 +20,7 @@ from pbem.contact.laws import PairLaws, find_changing
 from pbem.contact.loads import OuterNodes, evaluate_load, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.parallel import share_nodes
+from pbem.parallel import gather_parts, share_nodes
 from pbem.solve.petsc.session import list_factor_options, list_options
 from pbem.solve.petsc.shares import cut_equally, refuse_shares
 from pbem.solve.problem.problem import Problem
@@ -42,6 +42,7 @@ class DenseSystem:
     of the mean displacement at this rank's share of the crack nodes.
     """
 
+    comm: MPI.Intracomm
     operator: RowOperator
     block_unknowns: tuple[Integer, ...]
     crack_rows: tuple[RegionRows, ...]
@@ -70,6 +71,7 @@ class DenseSystem:
         own_cracks = cut_equally(np.flatnonzero(mesh.node_crack), comm)
         unknowns = find_unknowns_of_regions(mesh, outer, laws.leader, evaluate_load(model, mesh, outer, 0, 1.0))
         return DenseSystem(
+            comm=comm,
             operator=operator,
             block_unknowns=tuple(unknowns[block.region] for block in operator.blocks),
             crack_rows=tuple(assemble_displacement_rows(mesh, materials, own_cracks, needed)),
@@ -118,7 +120,7 @@ class DenseSystem:
         part = np.zeros(sum(len(block.rows) for block in self.crack_rows))
         for block in self.crack_rows:
             part[block.rows] = block.matrix @ v[block.columns]
-        return part
+        return gather_parts(self.comm, part)
 
     def make_tangent(self, problem: Problem) -> TangentOperator:
         """Condensed, or by GMRES if that is asked for; freed from the anchors if there are any."""

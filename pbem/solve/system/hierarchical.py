@@ -33,8 +33,8 @@ from pbem.heap import heap
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
 from pbem.model.model import Model
+from pbem.parallel import gather_parts
 from pbem.solve.petsc.session import find_number
-from pbem.solve.petsc.shares import cut_equally
 from pbem.solve.preconditioner.bodies import BodiesPreconditioner
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain, divide_model, share_groups, surround_groups
@@ -59,10 +59,11 @@ class Count:
 class HierarchicalSystem:
     """See pbem.solve.problem.problem.System.
 
-    crack_points: of the mean displacement at this rank's share of the crack nodes; None without cracks. groups: this
+    crack_points: of the mean displacement at this rank's own crack nodes; None without cracks. groups: this
     rank's groups of elements; widen_groups makes them with so many times as many elements around them.
     """
 
+    comm: MPI.Intracomm
     operator: HierarchicalOperator
     crack_points: PointRows | None
     groups: tuple[Subdomain, ...]
@@ -93,9 +94,11 @@ class HierarchicalSystem:
         operator = anchor_rows(
             operator, [Anchoring(each.region, each.nodes, each.pattern, each.functional) for each in anchors]
         )
-        own_cracks = cut_equally(np.flatnonzero(mesh.node_crack), comm)
+        # Own ones, which lie together: they see few clusters of others.
+        own_cracks = operator.nodes[mesh.node_crack[operator.nodes]]
         by_bodies = choose_body_factors(mesh) if find_number("newton_bodies", 1) else None
         return HierarchicalSystem(
+            comm=comm,
             operator=operator,
             crack_points=place_nodes_on_cracks(operator, own_cracks) if mesh.crack.any() else None,
             groups=surround_groups(mesh, groups, first, last),
@@ -147,7 +150,14 @@ class HierarchicalSystem:
 
     def recover(self, v: Real) -> Real:
         """See System (theory, 13)."""
-        return np.zeros(0) if self.crack_points is None else split_components(self.crack_points.displacement(v))
+        if self.crack_points is None:
+            return np.zeros(0)
+        mesh = self.operator.parts.mesh
+        owner = self.share.of_element[mesh.crack]
+        whole = np.empty((len(owner), 2 * (mesh.order + 1)))
+        part = split_components(self.crack_points.displacement(v))
+        whole[np.argsort(owner, kind="stable")] = gather_parts(self.comm, part).reshape(whole.shape)
+        return whole.ravel()
 
     def make_tangent(self, problem: Problem) -> TangentOperator:
         """GMRES, preconditioned by the groups, or by the factors of all bodies together."""

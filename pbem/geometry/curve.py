@@ -5,15 +5,18 @@ from __future__ import annotations
 import cmath
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.geometry.elements import Kind, choose_kind
 
+# Divisions of legs that are kept: most legs of a model are divided alike.
+DIVISIONS = 1024
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Leg:
     """A straight or circular piece of a curve from `start` to `end` (complex points) with its elements.
 
@@ -39,7 +42,7 @@ class Leg:
     def length(self) -> float:
         return float(self.kind.length(self))
 
-    @cached_property
+    @property
     def kind(self) -> Kind:
         """Its geometry: what pbem.geometry.elements knows of straight or circular ones."""
         return choose_kind(self)
@@ -94,32 +97,33 @@ class Leg:
 
     def element_fractions(self) -> Real:
         """The elements + 1 ends of the elements as fractions of the leg's length."""
-        return self._element_fractions.copy()
-
-    @cached_property
-    def _element_fractions(self) -> Real:
-        """Asked for ten times by what fits lengths, the mesh and the estimates."""
         if self.fractions is not None:
             return np.array(self.fractions)
         return self.divide(self.elements, self.refine_start, self.refine_end)
 
     def divide(self, elements: int, refine_start: bool, refine_end: bool) -> Real:
         """Fractions (elements + 1,) at t^power from every refined end, whatever elements the leg has (theory, 79)."""
-        t = np.linspace(0.0, 1.0, elements + 1)
-        if refine_start and refine_end:
-            t = np.where(t <= 0.5, 0.5 * (2 * t) ** self.power, 1 - 0.5 * (2 * (1 - t)) ** self.power)
-        elif refine_start:
-            t = t**self.power
-        elif refine_end:
-            t = 1 - (1 - t) ** self.power
-        return t
+        return _divide_unit(elements, refine_start, refine_end, self.power).copy()
 
     def element_ends(self) -> Complex:
         """The elements + 1 ends of the elements along the leg."""
         return self.point(self.element_fractions())
 
 
-@dataclass(frozen=True)
+@lru_cache(DIVISIONS)
+def _divide_unit(elements: int, refine_start: bool, refine_end: bool, power: float) -> Real:
+    """See Leg.divide. Asked for ten times by what fits lengths, the mesh and the estimates."""
+    t = np.linspace(0.0, 1.0, elements + 1)
+    if refine_start and refine_end:
+        t = np.where(t <= 0.5, 0.5 * (2 * t) ** power, 1 - 0.5 * (2 * (1 - t)) ** power)
+    elif refine_start:
+        t = t**power
+    elif refine_end:
+        t = 1 - (1 - t) ** power
+    return t
+
+
+@dataclass(frozen=True, slots=True)
 class Curve:
     """A named chain of legs, each starting where the one before ends; `closed` if it ends where it starts."""
 

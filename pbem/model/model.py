@@ -82,7 +82,7 @@ class Law:
     frictionless: bool = field(default=False, compare=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Interface:
     """A curve shared by two regions, or a crack in one region (`second` is None).
 

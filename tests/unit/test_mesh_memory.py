@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import pickle
 import tracemalloc
 
 import numpy as np
@@ -101,3 +102,20 @@ def test_pairs_of_cracks_and_interfaces_lie_at_their_nodes(monkeypatch: pytest.M
             for name, values in vars(one).items():
                 if isinstance(values, np.ndarray):
                     np.testing.assert_array_equal(vars(two)[name], values, err_msg=name)
+
+
+def test_a_crack_of_a_model_that_was_sent_takes_a_kilobyte() -> None:
+    """Every rank has the model as it comes from the first one; names, ends, divisions and tips of each crack."""
+    model = build(FIELD.replace("count = 12", "count = 300").replace("12, 12", "71, 71"))
+    generate_mesh(model)  # nothing that it finds is sent along
+    sent = pickle.dumps(model, pickle.HIGHEST_PROTOCOL)
+    pickle.loads(sent)
+    gc.collect()
+    tracemalloc.start()
+    there = pickle.loads(sent)
+    generate_mesh(there)
+    gc.collect()
+    kept = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert there.curves == model.curves
+    assert len(sent) < 250 * 300 and kept < 900 * 300

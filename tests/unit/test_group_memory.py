@@ -18,6 +18,7 @@ from pbem.solve.preconditioner.elimination import eliminate_tractions
 from pbem.solve.preconditioner.inversion import invert_rows
 from pbem.solve.preconditioner.local_operator import LocalOperator, Wanted
 from pbem.solve.preconditioner.near_map import take_near
+from pbem.solve.preconditioner.subdomains import divide_model, surround_groups
 from tests.unit.case_sample import build
 from tests.unit.test_map_memory import SCALE, draw
 from tests.unit.test_uniform import FIELD
@@ -63,3 +64,13 @@ def test_a_matrix_is_inverted_where_it_is(size: int) -> None:
     (found, _), most = measure_peak(lambda: invert_rows(given, rows, matrix.copy))
     np.testing.assert_allclose(found @ matrix, wanted, rtol=0, atol=1e-9)
     assert most < 0.3 * matrix.nbytes
+
+
+def test_of_groups_of_others_no_ends_are_listed() -> None:
+    """All ranks look for what is around their own groups among those of the whole model."""
+    mesh = generate_mesh(build(FIELD.replace("count = 12", "count = 600").replace("12, 12", "101, 101")))
+    groups = divide_model(mesh)
+    surround_groups(mesh, groups, 0, 9)  # what is found once is there
+    found, most = measure_peak(lambda: surround_groups(mesh, groups, 0, 9))
+    assert [each.elements.tolist() for each in found] == [group.tolist() for group in groups[:9]]
+    assert most < 50 * 2 * mesh.nodes

@@ -101,7 +101,13 @@ def surround_groups(
     tree = cKDTree(np.column_stack([center.real, center.imag]))
     most = widening * MOST_NEIGHBOURS
     count = min(4 * most, len(groups))
-    ends = [set(np.concatenate([mesh.start[group], mesh.end[group]]).tolist()) for group in groups]
+    ends: dict[int, set[complex]] = {}  # of the groups that are asked for: of all they are more than the mesh itself
+
+    def find_ends(group: int) -> set[complex]:
+        if group not in ends:
+            ends[group] = set(np.concatenate([mesh.start[groups[group]], mesh.end[groups[group]]]).tolist())
+        return ends[group]
+
     sets, connected = connect_elements(mesh)
     middle = 0.5 * (mesh.start + mesh.end)
     elements = cKDTree(np.column_stack([middle.real, middle.imag]))
@@ -115,7 +121,7 @@ def surround_groups(
         near = near[near != number]
         gap = np.abs(center[near] - center[number]) - radius[near] - radius[number]
         near = near[np.lexsort((near, gap))][:most]
-        touching = np.array([bool(ends[number] & ends[k]) for k in near], dtype=bool)
+        touching = np.array([bool(find_ends(number) & find_ends(int(k))) for k in near], dtype=bool)
         share = TOUCHING_SHARE if touching.any() else NEIGHBOUR_SHARE
         room = min(widening * max(NEIGHBOUR_UNKNOWNS, share * size[number]), MOST_AROUND - size[number])
         near = np.concatenate([near[touching], near[~touching]])

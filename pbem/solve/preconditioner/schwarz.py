@@ -143,18 +143,25 @@ class SchwarzPreconditioner:
         # Single precision has few powers of ten, which lengths in small units would fall out of. By a power of two, so
         # that its rounding is the same however many ranks there are.
         size = float(np.ldexp(0.5, np.frexp(np.abs(turned).max(initial=0.0))[1]))
-        single = (turned / size).astype(np.float32)
+        turned /= size
+        single = turned.astype(np.float32)
         count = len(self._nodes)
         own = turned[: 2 * count].reshape(-1, 2)
-        eliminated = np.einsum("nij,nj->ni", less.inverse[:count], own).ravel()
+        solved, without = np.zeros(2 * count), []
         for inverse in self.inverses:
-            if inverse.matrix is not None:
-                result[inverse.own] = eliminated[inverse.own]
-                seen = (single if inverse.matrix.dtype == np.float32 else turned / size)[inverse.seen]
-                result[inverse.own[inverse.solved]] += size * (inverse.matrix @ seen)
-            else:
-                # A group without an inverse, as of a matrix that overflows: its residual serves as it is.
-                result[inverse.own] = residual[inverse.own]
+            matrix = inverse.matrix
+            if matrix is None:
+                without.append(inverse.own)
+            elif matrix.size:
+                seen = (single if matrix.dtype == np.float32 else turned)[inverse.seen]
+                rows = inverse.own if len(matrix) == len(inverse.own) else inverse.own[inverse.solved]
+                solved[rows] = matrix @ seen
+        # Each of the unknowns is in one group.
+        solved += np.einsum("nij,nj->ni", less.inverse[:count], own).ravel()
+        np.multiply(solved, size, out=result)
+        for rows in without:
+            # A group without an inverse, as of a matrix that overflows: its residual serves as it is.
+            result[rows] = residual[rows]
 
     @property
     def _own(self) -> Elimination:
@@ -166,11 +173,11 @@ class SchwarzPreconditioner:
     def turn(self, residual: Real) -> Real:
         """This rank's equations (own unknowns,), turned so that those which determine eliminated unknowns stand alone.
         """
-        return np.asarray((self._own.turn @ residual.reshape(-1, 2, 1)).ravel())
+        return self._own.apply(residual)
 
     def turn_back(self, turned: Real) -> Real:
         """The inverse of `turn`."""
-        return np.asarray((self._own.turn.transpose(0, 2, 1) @ turned.reshape(-1, 2, 1)).ravel())
+        return np.asarray(np.einsum("nji,nj->ni", self._own.turn, turned.reshape(-1, 2)).ravel())
 
     @property
     def judged(self) -> Real:
@@ -184,7 +191,7 @@ class SchwarzPreconditioner:
         """
         less = self._own
         turned = self.turn(residual).reshape(-1, 2)
-        off = (less.inverse @ turned[..., None])[..., 0]
+        off = np.einsum("nij,nj->ni", less.inverse, turned)
         return off.ravel(), np.where(less.first, 0.0, turned).ravel()
 
     def respond(

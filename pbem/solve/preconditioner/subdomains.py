@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -28,6 +29,8 @@ ONE_GROUP = 1500
 # so many times as many, whichever group those belong to.
 CONNECTED_ELEMENTS = 128
 NEAREST_SHARE = 2.0
+# Groups whose nearest are looked for at once.
+AT_ONCE = 256
 # Candidates for the nearest, as a multiple of those taken.
 CANDIDATES = 3
 # A group that has an end point in common with others, like a piece of a longer boundary, always takes these, and more
@@ -96,11 +99,8 @@ def surround_groups(
     mesh: Mesh, groups: list[Integer], first: int, last: int, widening: int = 1
 ) -> tuple[Subdomain, ...]:
     """The groups of the numbers first .. last - 1, each with those around it: so many times as many as at first."""
-    center, radius = _enclose_groups(mesh, groups)
     size = np.array([len(group) for group in groups]) * 2 * (mesh.order + 1)
-    tree = cKDTree(np.column_stack([center.real, center.imag]))
     most = widening * MOST_NEIGHBOURS
-    count = min(4 * most, len(groups))
     ends: dict[int, set[complex]] = {}  # of the groups that are asked for: of all they are more than the mesh itself
 
     def find_ends(group: int) -> set[complex]:
@@ -109,19 +109,19 @@ def surround_groups(
         return ends[group]
 
     sets, connected = connect_elements(mesh)
-    middle = 0.5 * (mesh.start + mesh.end)
-    elements = cKDTree(np.column_stack([middle.real, middle.imag]))
+    numbers = np.arange(first, last)
+    by_place = np.array([len(groups) > 1 and connected[sets[groups[number][0]]] for number in numbers], dtype=bool)
+    if by_place.any():
+        middle = 0.5 * (mesh.start + mesh.end)
+        elements = cKDTree(np.column_stack([middle.real, middle.imag]))
+    nearest = dict(_list_nearest(mesh, groups, numbers[~by_place], most))
     result = []
-    for number in range(first, last):
-        if len(groups) > 1 and connected[sets[groups[number][0]]]:
+    for number in numbers.tolist():
+        if number not in nearest:
             result.append(_surround_by_nearest(mesh, groups[number], elements, widening))
             continue
-        _, near = tree.query([center[number].real, center[number].imag], k=count)
-        near = np.atleast_1d(near)
-        near = near[near != number]
-        gap = np.abs(center[near] - center[number]) - radius[near] - radius[number]
-        near = near[np.lexsort((near, gap))][:most]
-        touching = np.array([bool(find_ends(number) & find_ends(int(k))) for k in near], dtype=bool)
+        near = nearest.pop(number)
+        touching = np.array([not find_ends(number).isdisjoint(find_ends(k)) for k in near.tolist()], dtype=bool)
         share = TOUCHING_SHARE if touching.any() else NEIGHBOUR_SHARE
         room = min(widening * max(NEIGHBOUR_UNKNOWNS, share * size[number]), MOST_AROUND - size[number])
         near = np.concatenate([near[touching], near[~touching]])
@@ -129,6 +129,26 @@ def surround_groups(
         around = np.sort(np.concatenate([groups[number], *(groups[k] for k in taken)]))
         result.append(Subdomain(groups[number], around))
     return tuple(result)
+
+
+def _list_nearest(
+    mesh: Mesh, groups: list[Integer], numbers: Integer, most: int
+) -> Iterator[tuple[int, Integer]]:
+    """Of some groups each with the numbers of so many others at most, the nearest first.
+
+    Near is a small gap between the circles around them, of those whose centres are nearest.
+    """
+    center, radius = _enclose_groups(mesh, groups)
+    tree, count = cKDTree(np.column_stack([center.real, center.imag])), min(4 * most, len(groups))
+    for begin in range(0, len(numbers), AT_ONCE):
+        some = numbers[begin : begin + AT_ONCE]
+        _, near = tree.query(np.column_stack([center[some].real, center[some].imag]), k=np.arange(1, count + 1))
+        gap = np.abs(center[near] - center[some, None]) - radius[near] - radius[some, None]
+        gap[near == some[:, None]] = np.inf
+        order = np.lexsort((near, gap), axis=1)
+        near, gap = (np.take_along_axis(each, order, axis=1) for each in (near, gap))
+        for number, others, known in zip(some.tolist(), near, np.isfinite(gap), strict=True):
+            yield number, others[known][:most]
 
 
 def _surround_by_nearest(mesh: Mesh, group: Integer, elements: cKDTree, widening: int) -> Subdomain:

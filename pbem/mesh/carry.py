@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Complex, Integer, Real
+from pbem.geometry.curve import Curve
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -36,14 +37,20 @@ def list_curve_elements(model: Model, mesh: Mesh) -> list[tuple[str, Integer]]:
     chains = []
     key = np.stack([mesh.region, mesh.curve, mesh.crack])
     borders = np.flatnonzero((np.diff(key, axis=1) != 0).any(axis=0)) + 1
-    # As `divide_curve` has the first of each curve's elements.
-    firsts = {name: curve.legs[0].element_ends()[:2] for name, curve in model.curves.items()}
     for chain in np.split(np.arange(mesh.elements), borders):
         name = mesh.curve_names[mesh.curve[chain[0]]]
-        start, end = firsts[name]
-        forward = mesh.start[chain[0]] == start and mesh.end[chain[0]] == end
+        forward = _goes_forward(model.curves[name], mesh.start[chain[0]], mesh.end[chain[0]])
         chains.append((name, chain if forward else chain[::-1]))
     return chains
+
+
+def _goes_forward(curve: Curve, start: complex, end: complex) -> bool:
+    """Whether elements of a curve, of which the first one has these ends, go in its direction."""
+    if not curve.closed and start in (curve.start, curve.end):
+        return bool(start == curve.start)
+    # As `divide_curve` has the first of the curve's elements.
+    first = curve.legs[0].element_ends()[:2]
+    return bool(start == first[0] and end == first[1])
 
 
 def carry_nodes(fine_model: Model, fine: Mesh, coarse_model: Model, coarse: Mesh) -> Carry:

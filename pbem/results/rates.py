@@ -8,12 +8,13 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import SLIP
+from pbem.geometry.curve import Leg
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.interface_ends import find_interface_ends
@@ -211,25 +212,29 @@ class LegEnd:
 def list_corner_ends(model: Model) -> list[LegEnd]:
     """The ends of legs that meet another one at an angle, or several; in the order of the points at which they meet."""
     # Ends that meet are one number: pbem.geometry.shape.join_ends.
-    meeting: dict[complex, list[tuple[LegEnd, complex]]] = {}
+    meeting: dict[complex, list[tuple[str, int, Leg, bool]]] = {}
     for name, curve in model.curves.items():
         number = 0
         for leg in curve.legs:
-            lengths = leg.length * np.diff(leg.element_fractions())
-            first = LegEnd(name, number, lengths[0], True)
-            last = LegEnd(name, number + leg.elements - 1, lengths[-1], False)
-            meeting.setdefault(leg.start, []).append((first, leg.tangent(False)))
-            meeting.setdefault(leg.end, []).append((last, -leg.tangent(True)))
+            meeting.setdefault(leg.start, []).append((name, number, leg, True))
+            meeting.setdefault(leg.end, []).append((name, number + leg.elements - 1, leg, False))
             number += leg.elements
     found: list[LegEnd] = []
     bonded = list_bonded(model.interfaces, model.stages)
     on_interfaces = {end.point: end.power for end in find_interface_ends(model.curves, model.regions, bonded)}
     for point, ends in meeting.items():
+        if len(ends) < 2:  # the tip of a crack meets nothing
+            continue
+        power = on_interfaces.get(point, math.inf)
         if len(ends) == 2:
-            turn = abs(cmath.phase(-ends[0][1] / ends[1][1]))
-            found += [replace(end, power=find_corner_power(turn)) for end, _ in ends if turn >= TURN]
-        elif len(ends) > 2:  # the tip of a crack meets nothing
-            found += [replace(end, power=on_interfaces.get(point, math.inf)) for end, _ in ends]
+            one, other = (leg.tangent(not at_start) * (1 if at_start else -1) for _, _, leg, at_start in ends)
+            turn = abs(cmath.phase(-one / other))
+            if turn < TURN:
+                continue
+            power = find_corner_power(turn)
+        for name, element, leg, at_start in ends:
+            lengths = leg.length * np.diff(leg.element_fractions())
+            found.append(LegEnd(name, element, lengths[0 if at_start else -1], at_start, power))
     return found
 
 

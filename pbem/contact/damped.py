@@ -44,6 +44,7 @@ MOST_PARTED, MOST_LACKING = 3, 10
 MOST_EFFORT = 5e10
 
 Judge = Callable[[ModeState, PairState], Proposal]
+Lay = Callable[[ModeState, PairState], tuple[ModeState, Judge] | None]
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,14 @@ class Damped:
 
 
 def come_to_rest(
-    subset: Subset, response: Response, judge: Judge, holds: Callable[[ModeState], bool], before: Real
+    subset: Subset, response: Response, judge: Judge, holds: Callable[[ModeState], bool], before: Real,
+    lay: Lay = lambda modes, state: None,
 ) -> Damped:
     """Follow all pairs (s,) to where they rest, from the jumps g_n, g_s before (s, 2), a length.
 
-    judge: see settle_subset; holds: whether all bodies are held in these modes. Nothing is found on meshes on which
-    single pairs give way in the wrong sense. (theory, 129)
+    judge: see settle_subset; holds: whether all bodies are held in these modes. lay: where they are not, the modes with
+    bodies laid down that nothing drives, and the judge of these; None if others are free. Nothing is found on meshes on
+    which single pairs give way in the wrong sense. (theory, 129)
     """
     own, instants = _measure_stiffness(response), 0
     subset = replace(subset, effort=OperationCount(MOST_EFFORT))
@@ -82,7 +85,8 @@ def come_to_rest(
                 break
             now, present, left, lawful = found
             instants, lacking, held = instants + 1, 0 if lawful else lacking + 1, holds(now)
-            rest = _stay(replace(subset, modes=now), present, judge) if held else None
+            stays = (now, judge) if held else lay(now, present.evaluate(np.zeros(2 * subset.laws.count)))
+            rest = _stay(replace(subset, modes=stays[0]), present, stays[1]) if stays else None
             if rest:
                 return Damped(rest, None, instants)
             moved, same = present.values[:, 2:] - jumps, now.fingerprint() == modes.fingerprint()

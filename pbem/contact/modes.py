@@ -254,6 +254,12 @@ class Proposal:
     def changed(self) -> Bool:
         return self.violation > 0
 
+    def keep(self, modes: ModeState, kept: Bool) -> Proposal:
+        """The proposal, but that some pairs (m,) keep the modes that they have."""
+        now = ModeState(np.where(kept, modes.mode, self.modes.mode).astype(np.int8),
+                        np.where(kept, modes.sign, self.modes.sign))
+        return Proposal(now, np.where(kept, 0.0, self.violation))
+
 
 # The trial stiffness is that of a whole crack; the surroundings of a single pair are stiffer than this many times that.
 STIFFEST = 100.0

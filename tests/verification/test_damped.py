@@ -228,3 +228,40 @@ def test_a_wall_near_its_largest_load_ends_with_what_moves_on(variant: int, tmp_
     assert (record.status, record.verdict) == ("limit load", "near")
     assert "move on and come to no rest" in record.detail
     assert record.halved <= 6 and max(record.iterations) <= 8
+
+
+LOOSE = """
+materials.m = {{ young = 2.0e5, poisson = 0.28 }}
+materials.h = {{ young = 1.5e7, poisson = 0.1 }}
+curves.a = {{ center = [{x}, 0.0], radius = 1.0, elements = 16 }}
+curves.b = {{ center = [{far}, 0.0], radius = 0.6, elements = 16 }}
+regions.rock = {{ material = "m", infinite = true, boundary = ["a", "b"] }}
+regions.da = {{ material = "h", boundary = ["a"] }}
+regions.db = {{ material = "h", boundary = ["b"] }}
+interfaces.a = {{ law = "coulomb", friction = 0.75{weakens} }}
+interfaces.b = {{ law = "coulomb", friction = 0.22 }}
+analysis = {{ order = 1, scheme = "SST" }}
+[[stages]]
+remote = {{ sxx = -80.0, syy = -120.0, sxy = -30.0 }}
+[[stages]]
+remote = {{ sxx = 140.0, syy = 100.0, sxy = -30.0 }}
+"""
+
+
+@pytest.mark.parametrize(("x", "weakens"), [(0.0, ""), (300.0, ", friction_dynamic = 0.5, slip_distance = 1e-4")])
+def test_bodies_that_nothing_drives_lie_where_all_else_comes_to_rest(x: float, weakens: str) -> None:
+    """Principal stresses of a ratio of more than a third open round holes everywhere: the discs in them carry nothing,
+    and holes open by the same as without them."""
+    problem, tangent, memory, load = begin(LOOSE.format(x=x, far=x + 3.1, weakens=weakens))
+    rested: set[str] = set()
+    found = find_damped(problem, tangent, memory, load, rested)
+    assert found is not None and found.rest is not None
+    assert rested == {"da", "db"}
+    assert np.abs(found.rest.normal_traction).max() < 1e-6 * 140
+    closed = found.rest.modes.mode != OPEN
+    assert [(closed & (problem.mesh.pairs.interface == k)).sum() for k in range(2)] == [2, 2]
+    solution = solve_step(problem, tangent, memory, load, Listener())
+    np.testing.assert_allclose(solution.pairs.p_n, found.rest.normal_traction, rtol=0, atol=1e-6 * 140)
+    # Where bodies are not to be laid down nothing is at rest.
+    without = find_damped(problem, tangent, memory, load)
+    assert without is not None and without.rest is None and without.runs is None

@@ -328,7 +328,7 @@ class _Run:
         """Where the contact comes to rest, if that is asked for and found."""
         rest = None
         if self.search.asks_for_rest() and can_be_damped(self.problem, self.tangent):
-            rest = rest_late(self.problem, self.tangent, self.memory, self.load, self.search)
+            rest = rest_late(self.problem, self.tangent, self.memory, self.load, self.search, self.hold.rested)
             if not rest:
                 self.tangent.solve(found.constraints, self.load, found.law)  # it is asked for responses again
         return rest or find_rest(self.running, self.hold, self.tangent, found.constraints, self.modes, self.memory,

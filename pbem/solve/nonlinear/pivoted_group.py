@@ -97,8 +97,8 @@ def pivot_group(
 
         def holds(own: ModeState) -> bool:
             nonlocal refused
-            # A body that nothing drives is laid down again where these modes leave it free.
-            if not hold.leaves_free(complete(own), anchored, laid=True):
+            # A body that nothing drives is laid down again where these modes leave it free, until modes come back so.
+            if not hold.leaves_free(complete(own), anchored, laid=not search.level):
                 return True
             refused = refused or (anchored and not hold.leaves_free(complete(own)))
             return False

@@ -65,12 +65,17 @@ def rest_bodies(
 
 def find_idle(problem: Problem, state: PairState, pressure: Real, names: Sequence[str]) -> Bool:
     """Closed or not, the pairs (m,) around bodies that carry next to nothing: what lies where no load drives it."""
-    carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
-    usual = max(carried.max(), problem.traction_scale * np.hypot(state.g_n, state.g_s).max())
-    around = np.zeros(len(carried), dtype=bool)
+    around = np.zeros(len(pressure), dtype=bool)
     for name in names:
         around[find_pairs_around(problem.mesh, name)[0]] = True
-    return np.asarray(around & (carried <= IDLE * usual))
+    return around & is_idle(problem, state, pressure)
+
+
+def is_idle(problem: Problem, state: PairState, pressure: Real) -> Bool:
+    """Which of some pairs (k,) carry next to nothing."""
+    carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
+    usual = max(carried.max(), problem.traction_scale * np.hypot(state.g_n, state.g_s).max())
+    return np.asarray(carried <= IDLE * usual)
 
 
 def let_lie(
@@ -79,9 +84,7 @@ def let_lie(
     """The proposal, without changes of closed pairs that carry next to nothing around bodies that were laid down: what
     nothing drives is in balance without them but for rounding."""
     lying = (modes.mode != OPEN) & find_idle(problem, state, pressure, names)
-    now = ModeState(np.where(lying, modes.mode, proposal.modes.mode).astype(np.int8),
-                    np.where(lying, modes.sign, proposal.modes.sign))
-    return Proposal(now, np.where(lying, 0.0, proposal.violation))
+    return proposal.keep(modes, lying)
 
 
 def pulls_aside(

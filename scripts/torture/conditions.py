@@ -24,6 +24,10 @@ STICK, SLIP, OPEN = 0, 1, 2
 LIGHT = 1e-3
 
 
+# Of the largest traction: what rounding leaves of none.
+NOTHING = 1e-10
+
+
 @dataclass(frozen=True)
 class Scales:
     """Largest traction of the run, with the stress far away; largest jump of any pair, with the strain's share."""
@@ -73,7 +77,7 @@ def measure_contact(
         for tie in ties:
             if tie.curve in (name, contact.first):
                 tied |= (contact.arc_length > tie.start) & (contact.arc_length < tie.end)
-        found = _measure_pairs(contact, law, broken, pressure[:, None], ~tied)
+        found = _measure_pairs(contact, law, broken, pressure[:, None], ~tied, NOTHING * scales.stress)
         for rule, (value, is_length) in found.items():
             relative = value / (scales.jump if is_length else scales.stress)
             worst[rule] = max(worst.get(rule, 0.0), relative)
@@ -81,9 +85,12 @@ def measure_contact(
 
 
 def _measure_pairs(
-    contact: Any, law: Tables, broken: NDArray[np.bool_], pressure: Real, counted: NDArray[np.bool_]
+    contact: Any, law: Tables, broken: NDArray[np.bool_], pressure: Real, counted: NDArray[np.bool_], nothing: float
 ) -> dict[str, tuple[float, bool]]:
-    """Largest violations at the counted pairs (m,) of one curve, and whether they are lengths (or stresses)."""
+    """Largest violations at the counted pairs (m,) of one curve, and whether they are lengths (or stresses).
+
+    nothing: friction of no more than this stress has no sense, as of bodies that lie on pairs which carry nothing.
+    """
     mode, p_n, p_s = contact.mode, contact.traction_n, contact.traction_s
     stick, slips, is_open = (mode == kind for kind in (STICK, SLIP, OPEN))
     rigid_n = contact.opening - (p_n / law["normal_stiffness"] if "normal_stiffness" in law else 0.0)
@@ -112,7 +119,7 @@ def _measure_pairs(
         "open pair loaded": (largest(np.abs(p_n + pressure) + np.abs(p_s), is_open), False),
         "cone": (largest(np.abs(p_s) - bound, ~is_open), False),
         "slip below the cone": (largest(bound - np.abs(p_s), slips), False),
-        "slip along friction": (largest(-increment * np.sign(p_s), slips & (bound > 0)), True),
+        "slip along friction": (largest(-increment * np.sign(p_s), slips & (bound > nothing)), True),
         "stick moves": (largest(np.abs(increment), stick), True),
         "bond": (largest(far, (mode != STICK) | healed), True),
     }

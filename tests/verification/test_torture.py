@@ -152,6 +152,21 @@ def test_a_broken_condition_is_found_and_measured(settled: tuple, rule: str, qua
     assert measure_contact(broken, tables, scales, [whole])[rule] == 0.0
 
 
+@pytest.mark.parametrize(("part", "counts"), [(1e-12, False), (1e-3, True)])
+def test_friction_of_pairs_that_carry_nothing_has_no_sense(settled: tuple, part: float, counts: bool) -> None:
+    results, tables = settled
+    scales = measure_scales(results, tables)
+    contact = SimpleNamespace(**{
+        name: np.array(getattr(results.contact["seat"], name))
+        for name in ("mode", "opening", "slip", "traction_n", "traction_s", "arc_length")
+    }, first="base")  # fmt: skip
+    contact.mode[-1, 0], contact.slip[-1, 0] = 1, 0.5 * scales.jump
+    contact.traction_n[-1, 0], contact.traction_s[-1, 0] = -part * scales.stress, -0.5 * part * scales.stress
+    broken = SimpleNamespace(contact={"seat": contact}, pairs=results.pairs, steps=results.steps)
+    found = measure_contact(broken, tables, scales)
+    assert (found["slip along friction"] > 0.4) == counts
+
+
 def test_a_body_out_of_balance_is_found(settled: tuple) -> None:
     results, tables = settled
     heavier = json.loads(json.dumps(tables))

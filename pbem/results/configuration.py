@@ -80,7 +80,21 @@ def find_change(stored: str, model: Model) -> str:
     if not isinstance(had, list) or len(had) > len(has):
         return f"stages: {len(had) if isinstance(had, list) else 'none'} before, {len(has)} now"
     now["stages"] = has[: len(had)]
+    _turn_free_curves(before, now)
     return _find_difference(before, now, "")
+
+
+def _turn_free_curves(before: dict[str, Any], now: Mapping[str, Any]) -> None:
+    """Curves that were free of traction in all stages of a file may get one along any directions in stages that are
+    added: zeros are alike in both frames."""
+    given, had = now.get("conditions"), before.get("conditions")
+    if not isinstance(given, dict) or not isinstance(had, dict):
+        return
+    for name, condition in had.items():
+        values = [stage["boundary"].get(name) for stage in before["stages"]]
+        is_free = condition["known"] == ["traction", "traction"] and not any(condition["stiffness"])
+        if is_free and name in given and all(value == [0.0, 0.0] for value in values):
+            condition["frame"] = given[name]["frame"]
 
 
 def find_other_elements(stored: str, model: Model) -> str:

@@ -7,9 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from pbem.arrays import Bool
-from pbem.geometry.curve import Curve, turning_angle
-from pbem.geometry.intersection import project
+from pbem.arrays import Bool, Complex, Real
+from pbem.geometry.curve import Curve, Leg, turning_angle
 from pbem.model.model import Model
 from pbem.model.sight import CORNER
 
@@ -34,7 +33,7 @@ def find_elements_at_kinks(model: Model) -> Mapping[str, Bool]:
             curve = model.curves[name]
             points = [*_list_corners(curve), *_list_corners(model.curves[other])]
             if points and len(points) <= MOST * sum(leg.elements for leg in curve.legs):
-                at = np.any([_find_beside(curve, point) for point in points], axis=0)
+                at = _find_beside(curve, np.array(points))
                 found[name] = found.get(name, np.zeros(len(at), dtype=bool)) | at
     return found
 
@@ -45,14 +44,23 @@ def _list_corners(curve: Curve) -> list[complex]:
     return [before.end for (before, _), turn in zip(joints, turns, strict=True) if STRAIGHT < turn <= CORNER]
 
 
-def _find_beside(curve: Curve, point: complex) -> Bool:
-    """Whether each element of a curve is next to a point, across whatever gap."""
-    feet = [project(leg, point) for leg in curve.legs]
-    nearest = min(range(len(feet)), key=lambda number: feet[number][1])
+def _find_beside(curve: Curve, points: Complex) -> Bool:
+    """Whether each element of a curve is next to one of some points (k,), across whatever gap."""
+    # Twice over the legs: of curves of many legs the distances of all points from each would be too much to keep.
+    nearest = np.full(len(points), np.inf)
+    for leg in curve.legs:
+        nearest = np.minimum(nearest, _project(leg, points)[1])
     beside = []
-    for number, (leg, (t, _)) in enumerate(zip(curve.legs, feet, strict=True)):
-        ends = np.array(leg.element_fractions())
+    for leg in curve.legs:
+        t, distance = _project(leg, points)
+        t = t[distance <= nearest * (1 + 1e-9) + 1e-9 * curve.length]
+        ends = leg.element_fractions()
         spare = NEAR * np.diff(ends)
-        touches = feet[number][1] <= feet[nearest][1] * (1 + 1e-9) + 1e-9 * curve.length
-        beside.append((ends[:-1] - spare <= t) & (t <= ends[1:] + spare) & touches)
-    return np.concatenate(beside)
+        beside.append(((ends[:-1] - spare)[:, None] <= t) & (t <= (ends[1:] + spare)[:, None]))
+    return np.concatenate([each.any(axis=1) for each in beside])
+
+
+def _project(leg: Leg, points: Complex) -> tuple[Real, Real]:
+    """Of points (k,) the fraction of the leg nearest to each, and the distance."""
+    t = np.clip(leg.kind.project(leg, points), 0.0, 1.0)
+    return t, np.abs(leg.kind.place_fraction(leg, t) - points)

@@ -68,6 +68,7 @@ end:
     release(&all);
     return result;
 }
+
 /* number[i, k] = near[i, column[k]] / unit[i], to the nearest, and unit[i] = the largest of these over most. line
  * (count,): for a row. */
 static void pack_columns(const double *near, Py_ssize_t rows, Py_ssize_t columns, const int64_t *column,

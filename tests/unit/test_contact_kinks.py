@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -17,14 +19,14 @@ def describe_waves(legs: int, far: float = 0.0) -> Model:
     """A block on a layer, both drawn with `legs` straight legs, which are 0.01 apart; far: along x."""
     x = np.linspace(-1, 1, legs + 1)
     wave = 0.02 * np.cos(3 * x)
-    lower = [[-2, -0.05], *zip(x, wave - 0.01, strict=True), [2, -0.05]]
-    upper = list(zip(x, wave, strict=True))[::-1]
-    curves = {"foot": [[2, -0.05], [2, -1], [-2, -1], [-2, -0.05]], "lower": lower, "upper": upper,
-              "rest": [upper[-1], [-1, 1], [1, 1], upper[0]]}
+    upper = [(float(a), float(b)) for a, b in zip(x, wave, strict=True)][::-1]
+    lower = [(-2, -0.05), *((a, b - 0.01) for a, b in upper[::-1]), (2, -0.05)]
+    foot: list[tuple[float, float]] = [(2, -0.05), (2, -1), (-2, -1), (-2, -0.05)]
+    curves = {"foot": foot, "lower": lower, "upper": upper, "rest": [upper[-1], (-1, 1), (1, 1), upper[0]]}
     elements = {"foot": [4, 4, 4], "lower": [4, *[EACH] * legs, 4], "upper": [EACH] * legs, "rest": [4, 4, 4]}
     return describe_model({
         "materials": {"rock": {"young": 1.0, "poisson": 0.3}},
-        "curves": {name: {"points": [[float(a + far), float(b)] for a, b in points], "elements": elements[name],
+        "curves": {name: {"points": [[a + far, b] for a, b in points], "elements": elements[name],
                           "grading": "none"} for name, points in curves.items()},
         "regions": {"layer": {"material": "rock", "boundary": ["foot", "lower"]},
                     "block": {"material": "rock", "boundary": ["upper", "rest"]}},
@@ -53,7 +55,13 @@ def test_elements_that_the_corners_of_either_curve_are_nearest_to(far: float) ->
 
 def test_each_leg_is_asked_for_all_corners_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """One by one, curves of 200 legs took 20 s."""
-    model, asked, project = describe_waves(LEGS), [], Straight.project
-    monkeypatch.setattr(Straight, "project", lambda *given: asked.append(given) or project(*given))
+    model, project, asked = describe_waves(LEGS), Straight.project, 0
+
+    def count(*given: Any) -> Any:
+        nonlocal asked
+        asked += 1
+        return project(*given)
+
+    monkeypatch.setattr(Straight, "project", count)
     assert find_elements_at_kinks(model)
-    assert len(asked) <= 2 * sum(len(model.curves[name].legs) for name in ("lower", "upper"))
+    assert asked <= 2 * sum(len(model.curves[name].legs) for name in ("lower", "upper"))

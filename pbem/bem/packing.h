@@ -51,7 +51,11 @@ static PyObject *py_compare_columns(PyObject *Py_UNUSED(self), PyObject *args)
     const Py_ssize_t rows = take_number(args, COUNT);
     const Py_ssize_t groups = all.b[PART].len / (Py_ssize_t)sizeof(double);
     const Py_ssize_t columns = rows > 0 ? all.b[NEAR].len / (Py_ssize_t)sizeof(double) / rows : 0;
-    if (rows < 0 || !has_items(&all, NEAR, rows * columns, sizeof(double)) ||
+    if (rows < 0) {
+        if (!PyErr_Occurred()) PyErr_Format(PyExc_ValueError, "%zd rows; expected none or more", rows);
+        goto end;
+    }
+    if (!has_items(&all, NEAR, rows * columns, sizeof(double)) ||
         !has_items(&all, COLUMNS_BEGIN, groups + 1, sizeof(int64_t)) || !are_ranges(&all, COLUMNS_BEGIN, columns))
         goto end;
     if (!(of_column = PyMem_Malloc((columns + 1) * sizeof *of_column))) {

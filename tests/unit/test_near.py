@@ -113,3 +113,5 @@ def test_columns_that_are_not_there_are_not_packed(column: int) -> None:
         _expansions.pack_columns(near, np.array([0]), unit, number, 2**31)
     with pytest.raises(IndexError, match="argument 1"):
         _expansions.compare_columns(near, np.array([0, column]), np.empty(1), 2)
+    with pytest.raises(ValueError, match="-1 rows"):
+        _expansions.compare_columns(near, np.array([0, 12]), np.empty(1), -1)

@@ -55,8 +55,9 @@ def _find_beside(curve: Curve, points: Complex) -> Bool:
         t, distance = _project(leg, points)
         t = t[distance <= nearest * (1 + 1e-9) + 1e-9 * curve.length]
         ends = leg.element_fractions()
-        spare = NEAR * np.diff(ends)
-        beside.append(((ends[:-1] - spare)[:, None] <= t) & (t <= (ends[1:] + spare)[:, None]))
+        spare = NEAR * np.diff(ends)  # of the element opposite: those beside it may be much longer
+        low, high = ends[:-1] - np.append(0.0, spare[:-1]), ends[1:] + np.append(spare[1:], 0.0)
+        beside.append((low[:, None] <= t) & (t <= high[:, None]))
     return np.concatenate([each.any(axis=1) for each in beside])
 
 

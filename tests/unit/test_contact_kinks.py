@@ -65,3 +65,19 @@ def test_each_leg_is_asked_for_all_corners_at_once(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Straight, "project", count)
     assert find_elements_at_kinks(model)
     assert asked <= 2 * sum(len(model.curves[name].legs) for name in ("lower", "upper"))
+
+
+def test_long_elements_beside_short_ones_at_a_corner_are_not_at_it() -> None:
+    """Of a polygon in a round hole, graded towards its corners: those amid its sides keep their equation."""
+    corners = np.exp(2j * np.pi * np.arange(25) / 24) * 0.998
+    points = [[float(z.real), float(z.imag)] for z in corners[:-1]]
+    model = describe_model({
+        "materials": {"rock": {"young": 1.0, "poisson": 0.3}},
+        "curves": {"hole": {"center": [0, 0], "radius": 1.0, "elements": 32},
+                   "pin": {"points": [*points, points[0]], "elements": [4] * 24}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "boundary": ["hole"]},
+                    "pin": {"material": "rock", "boundary": ["pin"]}},
+        "contacts": {"fit": {"between": ["hole", "pin"], "friction": 0.2}},
+        "remote": {"syy": -1e-2},
+    })  # fmt: skip
+    assert find_elements_at_kinks(model)["pin"].tolist() == [True, False, False, True] * 24

@@ -231,13 +231,15 @@ def test_blocks_in_open_cracks_come_to_the_same_state_by_way_of_smoothed_laws(ma
 
 # Under it one of the two blocks is held by nothing.
 FLOATS = "sxx = 0.58, syy = -0.16, sxy = 0.28"
+# Cracks go on beyond the corners of blocks, where stresses are singular: so near to them what holds the block is felt.
+BESIDE = 0.01
 
 
 def test_a_block_that_floats_changes_nothing_away_from_it(
     many_groups: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Against the search that holds it by single pairs, and wherever the model lies or how its curves run: elsewhere
-    the same; around it the tractions to the part of the mean that is left over on it."""
+    the same; around it, and beside its corners, the forces of pairs to the part of the mean that is left over on it."""
     choose, anchored = OpenBlocks._choose_stiffness, []
 
     def record(blocks: OpenBlocks, modes: ModeState) -> Any:
@@ -251,14 +253,19 @@ def test_a_block_that_floats_changes_nothing_away_from_it(
     elsewhere = solve(move(write_blocks(FLOATS), 1.0, 3e4 - 7e4j, False), True).contact
     larger = solve(move(write_blocks(FLOATS), 1e3, 0j, False), True).contact
     held = solve(write_blocks(FLOATS), False).contact
-    mean = float(np.hypot(found.traction_n, found.traction_s).mean())
-    for other, unit, near in ((elsewhere, 1.0, 1e-8), (larger, 1e3, 1e-8), (held, 1.0, 1e-4)):
+    pairs = assemble(write_blocks(FLOATS)).mesh.pairs
+    away = np.abs(pairs.position[:, None] - pairs.position[around]).min(axis=1) > BESIDE
+    assert away.sum() > 0.6 * (~around).sum()
+    mean, parts = float(np.hypot(found.traction_n, found.traction_s).mean()), pairs.weight / pairs.weight.mean()
+    for other, unit, near, apart in (
+        (elsewhere, 1.0, 1e-8, ~around), (larger, 1e3, 1e-8, ~around), (held, 1.0, 1e-4, away)
+    ):
         np.testing.assert_array_equal(found.mode[~around], other.mode[~around])
         for name in ("slip", "opening", "traction_n", "traction_s"):
             one, two = getattr(found, name), getattr(other, name) * (unit if "traction" in name else 1 / unit)
-            np.testing.assert_allclose(one[~around], two[~around], rtol=0, atol=near * np.abs(one).max())
+            np.testing.assert_allclose(one[apart], two[apart], rtol=0, atol=near * np.abs(one).max())
             if "traction" in name:
-                np.testing.assert_allclose(one, two, rtol=0, atol=10 * FLOATING * mean)
+                np.testing.assert_allclose(one * parts, two * parts, rtol=0, atol=10 * FLOATING * mean)
 
 
 def test_what_is_tried_again_with_more_stiffness_is_told(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.curve import Curve, Leg, turning_angle
+from pbem.geometry.intersection import measure_distances
 from pbem.model.model import Model
 from pbem.model.sight import CORNER
 
@@ -47,10 +48,7 @@ def _list_corners(curve: Curve) -> list[complex]:
 def _find_beside(curve: Curve, points: Complex) -> Bool:
     """Whether each element of a curve is next to one of some points (k,), across whatever gap."""
     # Twice over the legs: of curves of many legs the distances of all points from each would be too much to keep.
-    nearest = np.full(len(points), np.inf)
-    for leg in curve.legs:
-        nearest = np.minimum(nearest, _project(leg, points)[1])
-    beside = []
+    nearest, beside = measure_distances(curve.legs, points), []
     for leg in curve.legs:
         t, distance = _project(leg, points)
         t = t[distance <= nearest * (1 + 1e-9) + 1e-9 * curve.length]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -83,12 +85,20 @@ def _look_for_free(model: Model, mesh: Mesh) -> Bool:
 
 def _keep_least_distance(mesh: Mesh, own: Integer) -> float:
     """See _find_least_distance; found once for the same free nodes of a mesh."""
-    known: dict[bytes, float] = mesh.keep("distances across", lambda _: {})
+    known, key = _recall(mesh, "distances across", own, lambda: _find_least_distance(mesh, own))
+    return known[key]
+
+
+def _recall(
+    mesh: Mesh, name: str, own: Integer, find: Callable[[], float]
+) -> tuple[dict[bytes, float], bytes]:
+    """What is known of the free nodes of a mesh, at first as it is found, and the key of these ones."""
+    known: dict[bytes, float] = mesh.keep(name, lambda _: {})
     key = own.tobytes()
     if key not in known:
         known.clear()  # those of a stage before
-        known[key] = _find_least_distance(mesh, own)
-    return known[key]
+        known[key] = find()
+    return known, key
 
 
 def _find_least_distance(mesh: Mesh, own: Integer) -> float:
@@ -114,11 +124,7 @@ def _is_clear(mesh: Mesh, own: Integer, reach: float) -> bool:
     of those that face it is as near as R. Most bodies are thicker than that: what is clear is remembered, as the search
     for what is across takes twelve times as long, in each step.
     """
-    known: dict[bytes, float] = mesh.keep("clear distances", lambda _: {})
-    key = own.tobytes()
-    if key not in known:
-        known.clear()  # those of a stage before
-        known[key] = 0.0
+    known, key = _recall(mesh, "clear distances", own, lambda: 0.0)
     if reach > known[key] > -np.inf:
         far = GENEROUS * reach
         position, normal = mesh.position[own], far * mesh.normal[own]

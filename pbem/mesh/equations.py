@@ -35,7 +35,9 @@ def choose_equations(model: Model) -> Equations:
     that an inner loop always keeps the displacement equation; with DBEM the side across it takes the traction equation.
     Traction equations on both faces of a narrow slot say nearly the same: there one of the faces keeps the displacement
     equation, as on the faces of a crack; both do on the faces of a thin part, which a traction equation hardly bends.
-    The same holds for faces beside a crack of the region, or beside a slot.
+    The same holds for faces beside a crack of the region, or beside a slot. Faces of inner loops count as well where
+    strips are sought: across a ligament between a hole and the side of its body lies one that keeps the displacement
+    equation anyhow, and a slot within a body is an inner loop.
     Elements at corners, ends of contact and changes of condition keep the displacement equation, see `_keep_ends`; so
     do those of contacts at blunt corners or opposite them, where displacements have a kink, see `contact_kinks`.
     """
@@ -49,9 +51,10 @@ def choose_equations(model: Model) -> Equations:
                 traction[number, side.curve] = (asks,) * len(model.curves[side.curve].legs)
         asked = [(curve, leg) for (of, curve), legs in traction.items() if of == number
                  for leg, asks in enumerate(legs) if asks]  # fmt: skip
-        strips = find_strips(model, region, asked) if len(asked) > 1 else []
-        kept = _cover_strips(strips)
-        notes += _explain_strips(model, region, strips, kept)
+        within = _list_inner_legs(model, region) if asked else []
+        strips = find_strips(model, region, asked + within) if len(asked + within) > 1 else []
+        kept = _cover_strips(strips, within)
+        notes += _explain_strips(model, region, strips, kept.intersection(asked))
         # Of the faces of a slot one takes the traction equation, as of those of a crack.
         slots = {leg: None for strip in strips if not strip.inside for leg in (strip.first, strip.second)}
         others = [leg for leg in asked if leg not in kept and leg not in slots]
@@ -98,9 +101,17 @@ def _keep_ends(curve: Curve, legs: Sequence[bool]) -> tuple[bool, ...]:
     return tuple(result)
 
 
-def _cover_strips(strips: Sequence[Strip]) -> set[tuple[str, int]]:
-    """Legs (curve, number): both faces of thin parts, and one at least of every slot."""
-    kept = {leg for strip in strips if strip.inside for leg in (strip.first, strip.second)}
+def _list_inner_legs(model: Model, region: Region) -> list[LegNumber]:
+    """Legs (curve, number) of the region's inner loops, which keep the displacement equation with every scheme."""
+    curves = [side.curve for loop in region.loops if not loop.outer for side in loop.sides]
+    return [(curve, number) for curve in curves for number in range(len(model.curves[curve].legs))]
+
+
+def _cover_strips(strips: Sequence[Strip], within: Sequence[LegNumber]) -> set[LegNumber]:
+    """Legs (curve, number): both faces of thin parts, and one at least of every slot; within: legs that keep the
+    displacement equation anyhow, of which those at strips are among the result."""
+    faces = {leg for strip in strips for leg in (strip.first, strip.second)}
+    kept = {leg for strip in strips if strip.inside for leg in (strip.first, strip.second)} | faces.intersection(within)
     for strip in strips:
         if strip.first not in kept and strip.second not in kept:
             kept.add(strip.first)
@@ -108,7 +119,7 @@ def _cover_strips(strips: Sequence[Strip]) -> set[tuple[str, int]]:
 
 
 def _explain_strips(
-    model: Model, region: Region, strips: Sequence[Strip], kept: set[tuple[str, int]]
+    model: Model, region: Region, strips: Sequence[Strip], kept: set[LegNumber]
 ) -> list[str]:
     """One sentence for every curve that keeps the displacement equation, with its narrowest strip."""
     narrowest: dict[str, Strip] = {}

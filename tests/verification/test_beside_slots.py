@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
 from pbem.mesh.equations import choose_equations
 from scripts.study_meshes import HERE, Place, read_lift, solve_slot
-from tests.verification.proofs.proof import line, write_case
+from tests.verification.proofs.proof import line, solve_case, write_case
 
 ELSEWHERE = Place(-71.0, 25.4, 1e4, -3 + 60j)
 
@@ -49,3 +50,30 @@ def test_one_face_of_a_slot_takes_the_traction_equation_and_the_faces_beside_it_
     equations = choose_equations(model)
     assert {name for name in names if any(equations.traction[0, name])} == {"high"}
     assert "right_low" in " ".join(equations.notes) and "beside" in " ".join(equations.notes)
+
+
+def solve_slot_within(width: float, scheme: str, order: int, elements: int) -> float:
+    """How far the top of a plate of 3 by 2 moves, that is clamped below and pulled at the top, around a slot within."""
+    corners = {"bottom": (-1j, 3 - 1j), "right": (3 - 1j, 3 + 1j), "top": (3 + 1j, 1j), "left": (1j, -1j)}
+    h = 0.5j * width
+    ends = [2.5 - h, 0.9 - h, 0.9 + h, 2.5 + h]
+    slot = {name: (ends[k], ends[(k + 1) % 4]) for k, name in enumerate(("low", "end", "high", "begin"))}
+    counts = {"low": 2 * elements, "high": 2 * elements + 5, "end": 2, "begin": 2}
+    names = [*corners, *slot]
+    solved = solve_case(
+        materials={"rock": {"young": 1000.0, "poisson": 0.2}},
+        curves={name: line(*ends, counts.get(name, elements)) for name, ends in (corners | slot).items()},
+        regions={"plate": {"material": "rock", "boundary": names}},
+        boundary={"bottom": {"ux": 0.0, "uy": 0.0}, "top": {"tx": 0.0, "ty": 0.1}},
+        analysis={"steps": 1, "scheme": scheme, "order": order},
+    )
+    nodes = solved.nodes("top")
+    corner = nodes[np.argmin(np.abs(solved.mesh.position[nodes] + solved.model.origin - (3 + 1j)))]
+    return float(solved.last.displacement[corner].imag)
+
+
+@pytest.mark.parametrize(("width", "order", "allowed"), [(0.05, 1, 4e-3), (1e-3, 1, 0.015), (0.05, 2, 1.5e-3)])
+def test_a_slot_within_a_plate(width: float, order: int, allowed: float) -> None:
+    # With traction equations on the plate's sides -8.1, -6.7 and +0.28 %: faces of a slot within were not looked for.
+    expected = solve_slot_within(width, "SST", 3, 24)
+    assert solve_slot_within(width, "THST", order, 12) == pytest.approx(expected, rel=allowed)

@@ -80,6 +80,28 @@ def test_a_search_that_has_spent_its_effort_takes_newtons_steps_alone() -> None:
     assert not search.is_spent()
 
 
+def test_effort_that_leads_to_fewer_changes_than_ever_is_given_back() -> None:
+    search, problem = Search(50, most_effort=4 * ALWAYS), SimpleNamespace(decide=lambda action: action())
+    modes = pose(np.zeros(COUNT), np.zeros(COUNT)).modes
+
+    def settle_with(found: bool) -> None:
+        def find(effort: OperationCount) -> Settled:
+            effort.take(2 * ALWAYS)
+            return Settled(modes if found else None, False, 1, np.zeros(0, dtype=bool))
+
+        search.conclude(search.pivot(problem, find))  # type: ignore[arg-type]
+
+    follow(search, *[[1, 2, 3, 4]] * 4)
+    for changes, left in ([1, 2, 3], 0.0), ([1, 2], 0.0), ([1, 2], 3 * ALWAYS), ([1], 0.0):
+        settle_with(found=True)
+        follow(search, changes)
+        assert search.effort == left
+    # Neither what found nothing, nor fewer changes by Newton's steps alone.
+    settle_with(found=False)
+    follow(search, [])
+    assert search.effort == 3 * ALWAYS
+
+
 def test_dashpots_end_once_their_effort_is_spent(monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(3)
     subset, response = pose(np.full(COUNT, 0.3), np.zeros(COUNT)), make_response(random, COUNT)

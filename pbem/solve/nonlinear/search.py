@@ -84,7 +84,7 @@ FUTILE, FUTILE_IF_SOFTENED = 6, 3
 FEW_IN_ALL, MOST_IN_ALL = 60, 120
 # So often in a search: where it first fails and before it ends.
 MOST_WIDENED = 2
-# Floating-point operations that the pivoting of a search may take for every iteration that it may have.
+# Floating-point operations that pivoting may take for every iteration of a search until fewer pairs change than ever.
 EFFORT = 2e9
 # The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
 SWEPT = 4
@@ -95,8 +95,7 @@ LATE, LATEST = 16, 24
 ALIKE = 3
 # Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
 STALLED = 4
-# The same where more pairs than this change each time: others than those that were pivoted. With soft trial stiffnesses
-# they change each other less.
+# The same where more pairs than this change each time: soft trial stiffnesses let them change each other less.
 MANY = 100
 
 
@@ -108,9 +107,9 @@ class Search:
     has been solved. excluded (m,): pairs that are in no such group, as their mode cannot change by itself, or as their
     law is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
     groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps); smooths: whether laws may be
-    smoothed (pbem.solve.nonlinear.smooth_search). wary: whether changes that
-    stall, and a full tangent that leads away, are met with caution where friction changes with slip. most_futile: see
-    FUTILE. most_effort: what pivoting may take in all (see pbem.contact.pivoting.OperationCount).
+    smoothed (pbem.solve.nonlinear.smooth_search). wary: whether changes that stall, and a full tangent that leads away,
+    are met with caution where friction changes with slip. most_futile: see FUTILE. most_effort: what pivoting may take
+    until fewer pairs change than ever (pbem.contact.pivoting.OperationCount): slender layers lift bit by bit.
     """
 
     def __init__(
@@ -130,7 +129,7 @@ class Search:
 
     def restart(self) -> None:
         """Begin anew, as after the failure of a bond."""
-        self.effort = 0.0  # what pivoting took
+        self.effort, self.pivoted = 0.0, False  # what pivoting took; whether the modes at hand are what it found
         self.spent = 0  # iterations that are no longer, or were never, among the counts
         self.counts: list[int] = []
         self.clustered: list[int] = []  # those after which clusters settled by themselves
@@ -176,7 +175,9 @@ class Search:
         self.proposal = proposal
         self.changed.append(np.flatnonzero(proposal.changed & ~self.excluded))
         self.counts.append(int(proposal.changed.sum()))
-        self.just_returned = False
+        if self.pivoted and self.counts[-1] < min(self.counts[:-1], default=0):
+            self.effort = 0.0
+        self.pivoted = self.just_returned = False
         near = law_error <= self.near or not self.varying
         if not self.counts[-1] and self.level and near and not self.returned:
             self.level, self.returned, self.just_returned, self.error = 0, True, True, law_error
@@ -301,7 +302,7 @@ class Search:
         of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
         """
         if found.modes is not None:
-            self.widening = False
+            self.widening, self.pivoted = False, True
             self.futile = self.pause = 0
             self.solved += 1
             return False

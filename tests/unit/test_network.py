@@ -237,6 +237,19 @@ def test_random_networks_against_brute_force(seed: int) -> None:
     check_sound(network)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_stretches_on_a_line_are_cut_at_ends_and_vertices_alone(seed: int) -> None:
+    """Rounding makes two of them cross somewhere, at a place that is no vertex: 3 of these 100 pairs."""
+    random_numbers = random.Random(seed)
+    for _ in range(25):
+        along = cmath.rect(random_numbers.uniform(0.5, 2.0), random_numbers.uniform(0.0, 2 * math.pi))
+        start = complex(random_numbers.uniform(-3, 3), random_numbers.uniform(-3, 3))
+        bend, begin = start + along, start + random_numbers.uniform(0.2, 0.8) * along
+        traces = draw(a=[start, bend, bend + 1j * along], b=[begin, begin + along])
+        nodes = {leg.start for curve in cut_network(traces, 1e-3).pieces.values() for leg in curve.legs}
+        assert nodes == {start, begin, bend}
+
+
 def describe(network: Network, unit: float = 1.0) -> tuple[Counter[str], Counter[str], list[float]]:
     lengths = sorted(curve.length / unit for curve in network.pieces.values())
     areas = sorted(block.area / unit**2 for block in network.blocks)

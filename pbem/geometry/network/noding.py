@@ -126,7 +126,7 @@ def _find_crossings(edges: _Edges, rounding: float) -> tuple[Integer, Complex]:
     one, other = one[keep], other[keep]
     curved = edges.shapes.rises() > 0
     thick = curved[one] | curved[other]
-    pairs, places = _cross_straight(edges, one[~thick], other[~thick])
+    pairs, places = _cross_straight(edges, one[~thick], other[~thick], rounding)
     more_pairs, more_places = [], []
     for i, j in zip(one[thick].tolist(), other[thick].tolist(), strict=True):
         for point in meeting_points(_pick(edges.shapes, i), _pick(edges.shapes, j), rounding):
@@ -142,8 +142,11 @@ def _pick(shapes: Elements, number: int) -> Leg:
     return Leg(**{name: each.item() for name, each in vars(shapes.select(number)).items()}, elements=1)
 
 
-def _cross_straight(edges: _Edges, one: Integer, other: Integer) -> tuple[Integer, Complex]:
-    """Of pairs of straight edges those that cross, and where; those that share a node do not."""
+def _cross_straight(
+    edges: _Edges, one: Integer, other: Integer, rounding: float
+) -> tuple[Integer, Complex]:
+    """Of pairs of straight edges those that cross, and where; those that share a node do not, nor do those of which one
+    lies on the line of the other within the rounding: there the place would be that of the rounding."""
     nodes = [(edges.first, edges.first), (edges.first, edges.second), (edges.second, edges.first),
              (edges.second, edges.second)]  # fmt: skip
     apart = np.ones(len(one), dtype=bool)
@@ -156,7 +159,10 @@ def _cross_straight(edges: _Edges, one: Integer, other: Integer) -> tuple[Intege
         return (np.conj(end - start) * (point - start)).imag
 
     before, after = side(c, d, a), side(c, d, b)
-    crossing = (before * after < 0) & (side(a, b, c) * side(a, b, d) < 0)
+    left, right = side(a, b, c), side(a, b, d)
+    crossing = (before * after < 0) & (left * right < 0)
+    crossing &= np.maximum(np.abs(before), np.abs(after)) > rounding * np.abs(d - c)
+    crossing &= np.maximum(np.abs(left), np.abs(right)) > rounding * np.abs(b - a)
     one, other, a, b = one[crossing], other[crossing], a[crossing], b[crossing]
     t = before[crossing] / (before[crossing] - after[crossing])
     return np.stack([one, other], axis=1), a + (b - a) * t

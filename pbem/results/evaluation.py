@@ -258,7 +258,7 @@ def _find_tips(reach: Real, tips: Complex, where: Whereabouts, run: RebuiltRun) 
     """Which points (q,) lie on a tip; reach (q,): see `find_points`."""
     # Beside the end of their element: what is written with finitely many digits need not lie on it.
     beside = np.maximum(2 * NEAR_TIP, ROUNDINGS * np.finfo(float).eps * reach / (0.5 * run.faces.lengths[where.face]))
-    on = np.flatnonzero((where.face >= 0) & (1 - np.abs(where.s) <= beside) & ~where.at_end)
+    on = np.flatnonzero((where.face >= 0) & (1 - np.abs(where.s) <= beside) & ~where.beside)
     at_tip = np.zeros(len(reach), dtype=bool)
     if len(on) and len(tips):
         face = where.face[on]

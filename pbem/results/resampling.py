@@ -117,7 +117,7 @@ def _read_ends(mesh: Mesh, nodes: Real) -> sparse.csr_matrix:
     weights = np.zeros((count, 2, 2, each))  # of the element itself, and of its neighbour there
     weights[:, :, 0] = own
     other = np.tile(np.arange(count)[:, None], (1, 2))
-    following, smooth = _find_neighbours(mesh)
+    following, smooth = find_neighbours(mesh)
     before = np.flatnonzero(following >= 0)
     after, smooth = following[before], smooth[before]
     # In units of both lengths together, from where they meet.
@@ -135,7 +135,7 @@ def _read_ends(mesh: Mesh, nodes: Real) -> sparse.csr_matrix:
     return sparse.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(2 * count, count * each))
 
 
-def _find_neighbours(mesh: Mesh) -> tuple[Integer, Bool]:
+def find_neighbours(mesh: Mesh) -> tuple[Integer, Bool]:
     """The element (e,) in which each goes on with the same displacement, or -1; and whether it does so smoothly.
 
     That is where two ends meet, and no others: where a crack begins, displacements differ.

@@ -14,6 +14,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.location import NEAR_END, TOUCHING
 from pbem.geometry.elements import Elements
 from pbem.mesh.mesh import Mesh
+from pbem.results.resampling import find_neighbours
 
 # Circles around elements are taken larger by this part.
 MARGIN = 0.02
@@ -21,18 +22,22 @@ MARGIN = 0.02
 CHUNK = 2_000_000
 # Coordinates are rounded by so many units of their last digit.
 ROUNDINGS = 8
+# Points nearer to a face than this part of the mean (geometric) of the model's extent and the length of the curve are
+# on it: over the square of the distance, the rounding of places would be a stress, beside the joints of elements. But
+# not if they are further than the part BESIDE of the element, or of what is left up to a corner, a tip or a junction.
+CLOSE, BESIDE = 5e-7, 1e-2
 
 
 @dataclass(frozen=True)
 class Whereabouts:
     """region (q,): index, -1 outside of all. face (q,): the element, or second face of a crack, on which a point lies,
-    or -1; s (q,): coordinate there. at_end (q,): it is one that lies beside the end of an element, not on it.
+    or -1; s (q,): coordinate there. beside (q,): it is one that lies beside the element or its end, not on it.
     """
 
     region: Integer
     face: Integer
     s: Real
-    at_end: Bool
+    beside: Bool
 
 
 def find_points(
@@ -68,9 +73,35 @@ def find_points(
     ending &= (mesh.region[first_faces[face]] == region[point]) & np.isfinite(off)
     close, chosen = np.unique(point[ending], return_index=True)
     _take(on, where, close, np.flatnonzero(ending)[chosen], face, s)
-    at_end = np.zeros(len(points), dtype=bool)
-    at_end[close] = True
-    return Whereabouts(region, on, where, at_end)
+    beside = np.zeros(len(points), dtype=bool)
+    beside[close] = True
+    # Beside a face, on its own side of a crack or interface.
+    left = (on[point] < 0) & (mesh.region[first_faces[face]] == region[point]) & np.isfinite(off)
+    left &= (np.abs(s.real) <= 1) & (s.imag > 0) & (s.imag < 2 * BESIDE)
+    left = np.flatnonzero(left)
+    if len(left):
+        left = left[s.imag[left] * half[left] < _find_limits(mesh, faces, first_faces, face[left], s.real[left])]
+    left = left[np.lexsort((s.imag[left] * half[left], point[left]))]
+    close, chosen = np.unique(point[left], return_index=True)
+    _take(on, where, close, left[chosen], face, s)
+    beside[close] = True
+    return Whereabouts(region, on, where, beside)
+
+
+def _find_limits(mesh: Mesh, faces: Elements, first_faces: Integer, face: Integer, s: Real) -> Real:
+    """The distance (k,) from places s on faces, within which points are on these."""
+    lengths = mesh.geometry.lengths
+    curves = np.bincount(mesh.curve, lengths)[mesh.curve[first_faces[face]]]
+    following, smooth = find_neighbours(mesh)
+    loose = np.ones((mesh.elements, 2), dtype=bool)
+    goes_on = np.flatnonzero((following >= 0) & smooth)
+    loose[goes_on, 1] = loose[following[goes_on], 0] = False
+    ends = loose[first_faces[face]]
+    # Second faces of cracks run the other way.
+    ends = np.where((face >= mesh.elements)[:, None], ends[:, ::-1], ends)
+    length = faces.lengths[face]
+    up_to = np.where(ends, 0.5 * length[:, None] * np.stack([1 + s, 1 - s], axis=1), np.inf).min(axis=1)
+    return np.asarray(np.minimum(CLOSE * np.sqrt(faces.extent * curves), BESIDE * np.minimum(length, up_to)))
 
 
 def _take(on: Integer, where: Real, points: Integer, chosen: Integer, face: Integer, s: Complex) -> None:

@@ -88,6 +88,30 @@ def test_stress_beside_a_crack(griffith: Results) -> None:
     assert np.abs(moved - exact.displacement(places)).max() < 1e-3 * np.abs(moved).max()
 
 
+@pytest.mark.parametrize("distance", [1e-9, 1e-8, 1e-7, 1e-6])
+def test_each_side_of_a_crack_however_near(distance: float, tmp_path: Path) -> None:
+    """A slanting open crack bears nothing: at 1e-8 of its half length the rounding of places told of 0.98 there."""
+    along = np.exp(1j * np.radians(33.0))
+    ends = to_points(0.37 + 0.21j + along * np.array([-1.0, 1.0]))
+    results = run(
+        tmp_path / "slanting.h5", curves={"crack": {"points": ends.tolist(), "elements": 8}},
+        regions={"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}}, remote={"syy": 1.0},
+    )
+    # At joints of elements, where values of both neighbours meet, at their middles, and elsewhere.
+    places, off = np.array([0.0, 0.5, 0.625, -0.25, 0.3]), 1j * along * distance
+    on = 0.37 + 0.21j + along * places
+    above, below = (results.evaluate(to_points(on + side * off)) for side in (1, -1))
+    jump = (above.displacement[0] - below.displacement[0]) @ [1, 1j]
+    opened = 4 / ROCK.plane_modulus * np.cos(np.radians(33.0)) * np.sqrt(1 - places**2)
+    if distance > 2e-9:  # nearer points are on the crack
+        np.testing.assert_allclose((jump / along).imag, opened * np.cos(np.radians(33.0)), rtol=2e-3)
+    normal = np.array([-along.imag, along.real])
+    for found in (above, below):
+        sxx, syy, sxy = found.stress[0].T
+        borne = np.hypot(sxx * normal[0] + sxy * normal[1], sxy * normal[0] + syy * normal[1])
+        assert borne.max() < 6e-3
+
+
 def test_tips_and_sides_of_a_crack(griffith: Results) -> None:
     points = [[-1.0, 0.0], [1.0, 0.0], [0.3, 0.0]]
     first, second = (griffith.evaluate(points, side=side) for side in ("first", "second"))
@@ -128,6 +152,11 @@ def test_both_sides_of_an_interface(blocks: Results) -> None:
     s = seat.normal[at] @ [[0, 1], [-1, 0]]
     jump = second.displacement[0, 0] - first.displacement[0, 0]
     assert jump @ s == pytest.approx(seat.slip[-1, at], rel=1e-9)
+    # Beside it, each point is on its own side.
+    for own, off in ((first, -1e-7), (second, 1e-7)):
+        near = blocks.evaluate(seat.position[at] + off * seat.normal[at], [-1], side="second" if own is first else "first")
+        assert near.region[0] == own.region[0] and near.on_boundary.all()
+        np.testing.assert_allclose(near.displacement, own.displacement, rtol=1e-9)
     pressed = np.array([[first.stress[0, 0, 0], first.stress[0, 0, 2]], [first.stress[0, 0, 2], first.stress[0, 0, 1]]])
     assert seat.normal[at] @ pressed @ seat.normal[at] == pytest.approx(seat.traction_n[-1, at], rel=1e-9)
 

@@ -91,12 +91,16 @@ class InteriorRows:
         return Values(moved, stress)
 
     def _evaluate_matrix(self, region: int, chosen: Integer) -> Real:
-        """ux, uy, sxx, syy, sxy, each of all points, from the region's displacements and tractions."""
-        sources, points = self._sources[region], self._points[chosen]
-        displacement = _evaluate(sources, points, None)
-        along_x, along_y = _evaluate(sources, points, 1.0), _evaluate(sources, points, 1j)
-        shear = 0.5 * (along_x[1::2] + along_y[0::2])
-        return np.concatenate([displacement[0::2], displacement[1::2], along_x[0::2], along_y[1::2], shear])
+        return evaluate_field(self._sources[region], self._points[chosen])
+
+
+def evaluate_field(sources: Sources, points: Complex) -> Real:
+    """ux, uy, sxx, syy, sxy, each of all points (k,), from the displacements, then the tractions, of the nodes of the
+    sources: (5 k, columns)."""
+    displacement = _evaluate(sources, points, None)
+    along_x, along_y = _evaluate(sources, points, 1.0), _evaluate(sources, points, 1j)
+    shear = 0.5 * (along_x[1::2] + along_y[0::2])
+    return np.concatenate([displacement[0::2], displacement[1::2], along_x[0::2], along_y[1::2], shear])
 
 
 def evaluate_limits(

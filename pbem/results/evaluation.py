@@ -20,10 +20,10 @@ from pbem.bem.pointwise import PointRows, spread_points
 from pbem.bem.rigid_motions import RigidMotions, find_rigid_motions, take_off_rigid_motions
 from pbem.mesh.interpolation import interpolate, interpolate_tips, split_faces
 from pbem.mesh.numbering import split_components
+from pbem.mesh.resampling import Resampling, resample
 from pbem.results.contents import Elements, Nodes, Steps
 from pbem.results.opening import open_quietly
 from pbem.results.rebuilt import RebuiltRun, find_opposite_faces, rebuild_run
-from pbem.results.resampling import Resampling, resample
 from pbem.results.whereabouts import ROUNDINGS, Whereabouts, find_points
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 

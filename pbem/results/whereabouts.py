@@ -14,7 +14,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.location import NEAR_END, TOUCHING
 from pbem.geometry.elements import Elements
 from pbem.mesh.mesh import Mesh
-from pbem.results.resampling import find_neighbours
+from pbem.mesh.resampling import find_neighbours
 
 # Circles around elements are taken larger by this part.
 MARGIN = 0.02

@@ -86,7 +86,8 @@ def put_field(mesh: Mesh, displacement: Complex, traction: Complex) -> Step:
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("distance", [0.3, 1e-3, 1e-6, 1e-7])
 def test_nothing_is_lost_close_to_a_boundary(order: int, distance: float) -> None:
-    # Linear fields are in the shapes: what is left of them is rounding. Distances in units of the nearest element.
+    # Linear fields are in the shapes: what is left of them is rounding, at order 3 of polynomials through the nodes of
+    # two unequal elements. Distances in units of the nearest element.
     exact = uniform_field(ROCK.kappa, ROCK.shear_modulus, (2.0, -1.0, 0.7), 1e-3, 0.1 + 0.2j)
     mesh = generate_mesh(make_square(2.0, order=order))
     middle = 0.5 * (mesh.start + mesh.end) + 0.17 * (mesh.end - mesh.start)
@@ -95,7 +96,7 @@ def test_nothing_is_lost_close_to_a_boundary(order: int, distance: float) -> Non
     field = InteriorField(model, mesh, world)
     assert (field.location.region == 0).all() and (field.location.element == -1).all()
     step = put_field(mesh, exact.displacement(mesh.position), exact.traction(mesh.position, mesh.normal))
-    expect_field(field.evaluate(step), exact, points, 1e-11)
+    expect_field(field.evaluate(step), exact, points, 1e-11 if order < 3 else 1e-10)
 
 
 @pytest.mark.parametrize("order", [2, 3])

@@ -9,9 +9,11 @@ import numpy as np
 from mpi4py import MPI
 
 from pbem.arrays import Bool, Complex
+from pbem.bem.beside_faces import BesideFaces
 from pbem.bem.hoop import evaluate_hoop_stress, sample_points
 from pbem.bem.interior import Values, evaluate_limits
 from pbem.bem.location import Location, locate_points
+from pbem.bem.rigid_motions import find_rigid_motions
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -54,12 +56,19 @@ class InteriorField:
     def _rows(self) -> InteriorRows:
         return self._place(self._model, self._mesh, self._points, self._location)
 
+    @cached_property
+    def _beside(self) -> BesideFaces:
+        model, mesh = self._model, self._mesh
+        rigid = find_rigid_motions(mesh, model.finite_regions, np.ones(4 * mesh.nodes, dtype=bool))
+        return BesideFaces(mesh, [region.material for region in model.regions], self._points, self._location, rigid)
+
     def evaluate(self, step: Step) -> InteriorValues:
         """Displacement and stress at all points after a step, on every rank; all ranks call this together.
 
         Inside, the sum of the region's particular solutions and of what the representation makes of the boundary
-        values less the balanced one. The far field is not taken from them: it goes on through the holes, so that from
-        outside the representation makes nothing of its part. On the boundary, the limits of the nodes' values.
+        values less the balanced one, beside faces of values that are continuous along them. The far field is not taken
+        from them: it goes on through the holes, so that from outside the representation makes nothing of its part. On
+        the boundary, the limits of the nodes' values.
         """
         mesh, particulars = self._mesh, evaluate_particular_solutions(self._model, step.stage, step.factor)
         first, opposite = split_faces(mesh, step.displacement)
@@ -82,7 +91,7 @@ class InteriorField:
                 if len(inside) and not particular.is_zero:
                     moved[inside] += particular.displacement(self._points[inside])
                     stress[inside] += particular.stress(self._points[inside])
-        elastic = self._rows.evaluate(displacement, traction)
+        elastic, joined = (rows.evaluate(displacement, traction) for rows in (self._rows, self._beside))
         hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in particulars], step.displacement, step.traction)
         moved_limit, carried_limit = step.displacement, step.traction
         of_points = sample_points(mesh, [each for each, _ in particulars])
@@ -95,8 +104,8 @@ class InteriorField:
                     moved[on] += balanced.of_points.displacement(self._points[on])
                     stress[on] += balanced.of_points.stress(self._points[on])
         limit = evaluate_limits(mesh, self._points, self._location, moved_limit, carried_limit, hoop_stress)
-        return self._gather(Values(moved + elastic.displacement + limit.displacement,
-                                   stress + elastic.stress + limit.stress))
+        return self._gather(Values(moved + elastic.displacement + joined.displacement + limit.displacement,
+                                   stress + elastic.stress + joined.stress + limit.stress))
 
     def _gather(self, part: Values) -> InteriorValues:
         flat = np.column_stack([part.displacement.real, part.displacement.imag, part.stress])

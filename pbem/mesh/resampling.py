@@ -28,10 +28,11 @@ SMOOTH = 1e-6
 
 @dataclass(frozen=True)
 class Resampling:
-    """mesh: of finer elements of order 3, without pairs; displacement, traction (new nodes, nodes): from the values at
-    the nodes of the run to those at its nodes."""
+    """mesh: of finer elements of order 3, without pairs; parts (e,): into how many each element of the run is cut, in
+    turn; displacement, traction (new nodes, nodes): from the values at the nodes of the run to those at its nodes."""
 
     mesh: Mesh
+    parts: Integer
     displacement: sparse.csr_matrix
     traction: sparse.csr_matrix
 
@@ -44,7 +45,7 @@ def resample(mesh: Mesh) -> Resampling:
     first, last = piece / parts[parent], (piece + 1) / parts[parent]
     fine = _cut(mesh, parent, first, last)
     along = first[:, None] + (last - first)[:, None] * fine.geometry.fractions(_place(fine))
-    return Resampling(fine, _join_displacements(mesh, parent, along), _join_tractions(mesh, fine, parent, along))
+    return Resampling(fine, parts, _join_displacements(mesh, parent, along), _join_tractions(mesh, fine, parent, along))
 
 
 def _place(mesh: Mesh) -> Real:

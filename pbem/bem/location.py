@@ -11,7 +11,7 @@ from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.mesh import Mesh
 
 # A point lies on an element if it is nearer to it than this part of half its length, or if it is inside and this near
-# to one of the element's ends, where the polynomials of neighbours differ.
+# to one of the element's ends, where the polynomials of neighbours differ: by the shortest element that ends there.
 TOUCHING = 1e-8
 NEAR_END = 1e-3
 CHUNK_BYTES = 32_000_000
@@ -37,14 +37,28 @@ def locate_points(mesh: Mesh, infinite: Sequence[int], points: Complex) -> Locat
     exact for straight elements and arcs, so that no point is on the wrong side of a curved boundary.
     """
     most = max(1, CHUNK_BYTES // (16 * 4 * mesh.elements))
-    parts = [_locate_chunk(mesh, infinite, points[k : k + most]) for k in range(0, len(points), most)]
+    ends = measure_ends(mesh) if len(points) else np.zeros((mesh.elements, 2))
+    parts = [_locate_chunk(mesh, infinite, points[k : k + most], ends) for k in range(0, len(points), most)]
     if not parts:
         none = np.zeros(0, dtype=np.int64)
         return Location(none, none, np.zeros(0))
     return Location(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
-def _locate_chunk(mesh: Mesh, infinite: Sequence[int], points: Complex) -> tuple[Integer, Integer, Real]:
+def measure_ends(mesh: Mesh) -> Real:
+    """How near to the start and the end of each element (e, 2) a point is beside that end, in units of half its length.
+
+    A long element and a short one may meet: what is near to the end of the one may be beside the middle of the other.
+    """
+    ends = np.concatenate([mesh.start, mesh.end])
+    lengths = np.tile(mesh.geometry.lengths, 2)
+    _, place = np.unique(ends, return_inverse=True)
+    shortest = np.full(len(ends), np.inf)
+    np.minimum.at(shortest, place.ravel(), lengths)
+    return np.asarray((NEAR_END * shortest[place.ravel()] / lengths).reshape(2, -1).T)
+
+
+def _locate_chunk(mesh: Mesh, infinite: Sequence[int], points: Complex, ends: Real) -> tuple[Integer, Integer, Real]:
     with np.errstate(divide="ignore", invalid="ignore"):
         straight = mesh.geometry.preimage(points).T  # each element from -1 to 1
     off = np.maximum(np.abs(straight.imag), np.abs(straight.real) - 1)
@@ -58,7 +72,8 @@ def _locate_chunk(mesh: Mesh, infinite: Sequence[int], points: Complex) -> tuple
     region = np.where(inside.any(axis=1), np.argmax(inside, axis=1), -1)
     region = np.where(touches, mesh.region[nearest], region)
     element = np.where(touches, nearest, -1)
-    near_end = (np.abs(np.abs(straight.real) - 1 + 1j * straight.imag) < NEAR_END) & ~mesh.crack
+    limits = np.where(straight.real < 0, ends[:, 0], ends[:, 1])
+    near_end = (np.abs(np.abs(straight.real) - 1 + 1j * straight.imag) < limits) & ~mesh.crack
     near_end &= (np.array(infinite)[mesh.region] >= 0)
     near_end &= (mesh.region == region[:, None]) & ~touches[:, None]
     close = near_end.any(axis=1)

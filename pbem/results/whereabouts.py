@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.bem.location import NEAR_END, TOUCHING
+from pbem.bem.location import TOUCHING, measure_ends
 from pbem.geometry.elements import Elements
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.resampling import find_neighbours
@@ -67,8 +67,9 @@ def find_points(
     _take(on, where, touched, order[chosen], face, s)
     region[touched] = mesh.region[first_faces[on[touched]]]
     # Beside an end of an element inside of its region: there the polynomials of neighbours differ.
-    ending = np.abs(np.abs(s.real) - 1 + 1j * s.imag) < NEAR_END
     inner = face < mesh.elements
+    limits = measure_ends(mesh)[np.where(inner, face, 0), (s.real > 0).astype(int)]
+    ending = np.abs(np.abs(s.real) - 1 + 1j * s.imag) < limits
     ending &= inner & ~mesh.crack[np.where(inner, face, 0)] & (on[point] < 0)
     ending &= (mesh.region[first_faces[face]] == region[point]) & np.isfinite(off)
     close, chosen = np.unique(point[ending], return_index=True)

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 import pbem
 import pbem.results.evaluation
+from pbem.bem.location import locate_points
 from pbem.exact import griffith_field, kirsch_field
 from pbem.results.curve_profile import read_profile
 from pbem.results.evaluation import Side
 from pbem.results.reader import Results, open_results
+from pbem.results.rebuilt import rebuild_run
 from tests.cli.cli_sample import BLOCKS
 from tests.verification.planes import ROCK
 
@@ -330,3 +332,27 @@ def test_fields_beside_short_elements_on_maps(tmp_path: Path) -> None:
     for plain, moved in zip(*found, strict=True):
         assert np.isfinite(plain).all()
         np.testing.assert_allclose(moved, plain, rtol=0, atol=1e-6 * np.abs(plain).max())
+
+
+def test_short_elements_at_the_end_of_a_long_one(tmp_path: Path) -> None:
+    """Points beside the first elements of the foot, which are shorter than a thousandth of the side's element: they
+    had the values of its end, off by the traction of the foot as a whole."""
+    results = pbem.run({
+        "materials": MATERIALS,
+        "curves": {
+            "foot": {"points": [[0, 0], [1, 0]], "elements": 40, "grading": "start"},
+            "right": {"points": [[1, 0], [1, 1]], "elements": 4}, "top": {"points": [[1, 1], [0, 1]], "elements": 4},
+            "left": {"points": [[0, 1], [0, 0]], "elements": 2, "grading": "none"},
+        },
+        "regions": {"body": {"material": "rock", "boundary": ["foot", "right", "top", "left"]}},
+        "boundary": {"foot": {"ux": 0.0, "uy": 0.0}, "top": {"ux": 0.01, "uy": -0.01}}, "analysis": {"steps": 1},
+    }, tmp_path / "foot.h5")
+    lengths = np.hypot(*np.diff(results.elements.vertices, axis=1)[:, 0].T)
+    on = np.flatnonzero((results.nodes.position[:, 1] == 0) & (results.nodes.position[:, 0] < 5e-4))
+    off = 0.02 * lengths[results.nodes.element[on]]
+    beside = results.nodes.position[on] + np.column_stack([0 * off, off])
+    assert len(on) >= 6 and not results.evaluate(beside).on_boundary.any()
+    run_again = rebuild_run(str(results.path), results.nodes, results.elements, results.configuration)
+    assert (locate_points(run_again.mesh, [0], beside @ [1, 1j] - run_again.model.origin).element < 0).all()
+    # Beside the corner itself, by the shortest element that ends there.
+    assert results.evaluate([[1e-9, 1e-9]]).on_boundary.all()

@@ -235,7 +235,8 @@ def assemble_hierarchical(
     wanted = mark_ancestors(forest, owned)
     met = find_interactions(forest, forest, RATIO, wanted)
     targets = see_sources(sources, forest, wanted, log_lengths(parts, forest), met)
-    scale = scale_equations(mesh, parts.materials, length)
+    scale = scale_equations(mesh, parts.materials, length, nodes)
+    position, normal = mesh.position[nodes], mesh.normal[nodes]
     begin, end = np.searchsorted(met.near_target, owned), np.searchsorted(met.near_target, owned, side="right")
     near_clusters = [met.near_source[low:high] for low, high in zip(begin, end, strict=True)]
     seen = _see_elements(parts, sources, np.unique(met.near_source))
@@ -244,16 +245,17 @@ def assemble_hierarchical(
     for leaf, clusters in zip(owned, near_clusters, strict=True):
         at = list_nodes(mesh, forest.items(leaf))
         at = at[row_of_node[at] >= 0]
+        row = row_of_node[at]
         elements = np.sort(np.concatenate([forest.items(source) for source in clusters]))
-        columns, near = _evaluate_leaf(parts, int(leaf), at, elements, needed)
-        near *= -np.repeat(scale[at], 2)[:, None]
+        columns, near = _evaluate_leaf(parts, int(leaf), at, (position[row], normal[row]), elements, needed)
+        near *= -np.repeat(scale[row], 2)[:, None]
         elastic = parts.materials[int(forest.region[leaf])].rigid is None
-        rows, width = number_components(row_of_node[at]), 2 * (mesh.order + 1)
+        rows, width = number_components(row), 2 * (mesh.order + 1)
         strong = pack_rows(rows, columns, near, width, 2 * mesh.nodes, weak if elastic else 0.0)
         leaves.append(strong if seen.whole else strong.place(seen.find))
         if elastic:
             far.append((int(leaf), at))
-    free = collect_free_terms(mesh, nodes, scale[nodes])
+    free = collect_free_terms(mesh, nodes, scale)
     # Expansions of the parts of a rigid motion cancel only up to their error, which would be felt where a body moves by
     # much more than it is strained: what fits best is taken off before. Small regions have no expansions.
     rigid = tuple(
@@ -308,7 +310,7 @@ def _see_elements(parts: Sorted, sources: SourceTree, near: Integer) -> SeenEntr
 def _place_far_rows(
     parts: Sorted, seen: list[tuple[int, Integer]], targets: TargetTree, row_of_node: Integer, scale: Real
 ) -> FarRows:
-    """The rows of nodes in leaves, pairs (leaf, nodes), on the fields there."""
+    """The rows of nodes in leaves, pairs (leaf, nodes), on the fields there; scale (rows / 2,): of their equations."""
     mesh = parts.mesh
     leaves = np.array([leaf for leaf, _ in seen], dtype=np.int64)
     nodes = np.concatenate([np.zeros(0, dtype=np.int64), *(at for _, at in seen)])
@@ -317,13 +319,13 @@ def _place_far_rows(
         np.searchsorted(targets.clusters.number, leaves), np.cumsum([0, *(len(at) for _, at in seen)]),
         mesh.position[nodes], np.where(mesh.traction_equation[nodes], mesh.normal[nodes], 0.0), kappa, modulus,
     )  # fmt: skip
-    return FarRows(points, number_components(row_of_node[nodes]).reshape(-1, 2), -scale[nodes])
+    return FarRows(points, number_components(row_of_node[nodes]).reshape(-1, 2), -scale[row_of_node[nodes]])
 
 
 def _evaluate_leaf(
-    parts: Sorted, leaf: int, nodes: Integer, elements: Integer, needed: Bool
+    parts: Sorted, leaf: int, nodes: Integer, places: tuple[Complex, Complex], elements: Integer, needed: Bool
 ) -> tuple[Integer, Real]:
-    """Columns of v, and the near rows of a leaf's nodes on them."""
+    """Columns of v, and the near rows of a leaf's nodes on them; places: positions and normals of the nodes."""
     mesh, forest = parts.mesh, parts.forest
     region = int(forest.region[leaf])
     chosen = parts.sources[region].select(elements - parts.first_element[region])
@@ -343,8 +345,8 @@ def _evaluate_leaf(
         if len(at) == 0:
             continue
         own = nodes[at]
-        normal = mesh.normal[own] if traction else None
-        values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, mesh.take_local(own))
+        normal = places[1][at] if traction else None
+        values = evaluate_rows(chosen, places[0][at], on[at], normal, bounded, mesh.take_local(own))
         whole = np.concatenate([value for value in values if value is not None], axis=1)
         near[number_components(at)] = whole[:, kept]
     return columns[kept], near

@@ -30,6 +30,7 @@ from pbem.contact.laws import (
     ModeState,
     PairLaws,
     PairState,
+    StrengthGroup,
     evaluate_strength,
     plastic_slip,
     resists_slip,
@@ -92,12 +93,10 @@ def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState
     for group in laws.strengths:
         if not len(group.pairs):
             continue
-        place = np.minimum(np.searchsorted(group.pairs, pairs), len(group.pairs) - 1)  # they rise
-        inside = np.flatnonzero(group.pairs[place] == pairs)
+        inside, place = _find_members(group, laws.count, pairs)
         if not len(inside):  # laws of one's own are not asked about no pairs
             continue
-        taken = place[inside]
-        parameters = {name: values[taken] for name, values in group.parameters.items()}
+        parameters = {name: values[place] for name, values in group.parameters.items()}
         groups.append(replace(group, pairs=inside, parameters=parameters))
     arrays = {name: getattr(laws, name)[pairs] for name in vars(laws) if name not in ("strengths", "leader")}
     arrays["leader"] = np.arange(len(pairs))
@@ -111,6 +110,15 @@ def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState
         pressure[pairs],
         _take_modes(modes, pairs),
     )  # fmt: skip
+
+
+def _find_members(group: StrengthGroup, count: int, pairs: Integer) -> tuple[Integer, Integer]:
+    """Which of some pairs (s,), of all the count, are of a group, and their places in it."""
+    if len(group.pairs) == count:  # they rise
+        return np.arange(len(pairs)), pairs
+    place = np.minimum(np.searchsorted(group.pairs, pairs), len(group.pairs) - 1)
+    inside = np.flatnonzero(group.pairs[place] == pairs)
+    return inside, place[inside]
 
 
 def _take_modes(modes: ModeState, pairs: Integer) -> ModeState:

@@ -30,6 +30,8 @@ from pbem.contact.declaration import (
 from pbem.contact.friction_bound import Strength
 from pbem.contact.leaders import find_leaders
 from pbem.contact.strength import choose_strength
+from pbem.contact.surroundings import find_surroundings, stiffen
+from pbem.formed import form_runs
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model
 from pbem.model.varying import Places, Value, spread_values
@@ -188,11 +190,8 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
     pairs = mesh.pairs
     joints = [find_joint(model, name) for name in mesh.interface_names]
     laws = [joint.law for joint in joints]
-    material = np.array([region.material.plane_modulus for region in model.regions])
-    node_region = mesh.node_region
-    modulus = np.minimum(material[node_region[pairs.first]], material[node_region[pairs.second]])
-    length = np.bincount(pairs.interface, pairs.weight, minlength=len(laws))[pairs.interface]
-
+    around = find_surroundings(mesh, [region.material.plane_modulus for region in model.regions])
+    stiffness, own_stiffness = stiffen(around, SOFTNESS)
     places = Places(pairs.position + model.origin, pairs.arc_length)
 
     def spread(values: list, kind: type = float) -> np.ndarray:
@@ -209,8 +208,8 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         fluid_inside=spread([law.pressurised == "all" for law in laws], bool),
         compliance_n=spread([1 / law.normal_stiffness if law.normal_stiffness else 0.0 for law in laws]),
         compliance_s=spread([1 / law.tangential_stiffness if law.tangential_stiffness else 0.0 for law in laws]),
-        stiffness=fold_uniform(SOFTNESS * modulus / length),
-        own_stiffness=fold_uniform(modulus / np.where(pairs.weight > 0, pairs.weight, length)),
+        stiffness=stiffness,
+        own_stiffness=own_stiffness,
         leader=share_equal(find_leaders(mesh, model.ties, joints), pairs.first),
         stiffening=spread([
             1 / closure if isinstance(closure := law.parameters.get("closure"), float) else 0.0 for law in laws
@@ -254,7 +253,7 @@ def _group_strengths(
         }
         if function not in functions.values():  # a law of the user's may write to what it is given
             values = {name: fold_uniform(each) for name, each in values.items()}
-        groups.append(StrengthGroup(function, pairs, values))
+        groups.append(StrengthGroup(function, form_runs(pairs), values))
     return tuple(groups)
 
 
@@ -348,7 +347,8 @@ def start_memory(laws: PairLaws) -> Memory:
     for variable, at, parameters in _list_parts(laws):
         internal[variable.name][at] = variable.start(parameters)
     slip, none = fold_uniform(0.0 - laws.at_rest_s), repeat_value(0.0, laws.count)
-    return Memory(modes, slip, internal, none, laws.gap).lose(laws.brittle & is_open)
+    internal = {name: fold_uniform(values) for name, values in internal.items()}
+    return Memory(modes, slip, internal, none, laws.gap).lose(fold_uniform(laws.brittle & is_open))
 
 
 def lay_out(laws: PairLaws) -> dict[str, NDArray[Any]]:

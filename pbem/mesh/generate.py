@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.carrier import NO_CARRIERS, find_carriers
 from pbem.geometry.elements import Elements
+from pbem.mesh.by_elements import form_by_elements
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import count_elements, divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
@@ -36,7 +37,7 @@ def generate_mesh(model: Model) -> Mesh:
     def repeat(values: list, dtype: type) -> np.ndarray:
         return fold_uniform(np.repeat(np.array(values, dtype=dtype), counts))
 
-    return Mesh(
+    return form_by_elements(Mesh(
         order=order,
         local=place_nodes(order),
         crack_local=place_crack_nodes(order),
@@ -58,7 +59,7 @@ def generate_mesh(model: Model) -> Mesh:
         curve_names=curve_names,
         interface_names=(*model.interfaces, *model.contacts),
         notes=(*equations.notes, *_note_contacts(model, pairs)),
-    )
+    ))
 
 
 def _place_nodes(chains: Sequence[Chain], order: int) -> tuple[Complex, Complex, Real]:

@@ -19,7 +19,7 @@ ORDER = (
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "blas_kernels", "environment", "parallel", "exact", "clock",
-        "heap", "loading", "uniform", "linear_programme")
+        "heap", "loading", "uniform", "formed", "linear_programme")
 # ... but mechanics knows nothing of processes, and results are read without them.
 MAY_BE_PARALLEL = (
     "solve", "pass_file", "storing", "driver", "sweeps", "run_command", "sweep_command", "cli", "__main__", "parallel",

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from pbem.contact.anchor import anchor_motions
 from pbem.contact.laws import PairLaws, collect_laws, find_linear
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, find_needed_columns
+from pbem.formed import FormedArray
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.recall import Recall
@@ -164,7 +165,7 @@ def digest(value: Any) -> bytes:
 
 
 def _feed(found: Any, value: Any) -> None:
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | FormedArray):
         found.update(f"a{value.dtype.str}{value.shape}".encode())
         found.update(np.ascontiguousarray(value).tobytes())
     elif is_dataclass(value) and not isinstance(value, type):

@@ -16,11 +16,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from pbem.arrays import Integer, Real
 from pbem.errors import LaunchError, StopError, printable
 
 T = TypeVar("T")
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 PETSC_ERR_MEM, PETSC_ERR_LIB = 55, 76
 # How PETSc tells that MUMPS could not allocate what it needs to solve.
@@ -278,6 +280,13 @@ def add_up(comm: MPI.Intracomm, part: Real) -> Real:
     whole = np.empty(part.shape, part.dtype)  # in C's order, as what is sent
     comm.Allreduce(np.ascontiguousarray(part), whole)
     return whole
+
+
+def add_up_there(comm: MPI.Intracomm, part: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The same in the array of each rank, which is in C's order: large ones are not held twice."""
+    if comm.size > 1:
+        comm.Allreduce(MPI.IN_PLACE, part)
+    return part
 
 
 def norm_of_parts(comm: MPI.Intracomm, part: Real) -> float:

@@ -157,6 +157,25 @@ def solve_and_sweep(problem: Problem, modes: ModeState) -> tuple[ModeState, Real
     return settled, states
 
 
+def test_ranks_send_each_other_four_numbers_and_two_bytes_of_each_pair(
+    many_groups: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a sweep; besides, in all but the first, the two tractions."""
+    sent: list[float] = []
+
+    def note(comm: object, part: np.ndarray) -> np.ndarray:
+        sent.append(part.nbytes / len(part))
+        return part
+
+    monkeypatch.setattr(sweeps, "add_up_there", note)
+    problem = assemble(write_network())
+    modes, states = solve_and_sweep(problem, draw_modes(problem.mesh.pairs.count))
+    assert sent[:2] == [32, 2] and len(sent) > 2
+    assert sent[2:] == [16, 32, 2] * (len(sent) // 3)
+    assert modes.mode.flags.c_contiguous and (modes.sign[modes.mode == SLIP] != 0).all()
+    assert states.shape == (problem.mesh.pairs.count, 4)
+
+
 def test_modes_of_the_solution_stay_as_they_are(many_groups: None) -> None:
     problem = assemble(write_network())
     (step,) = march(problem, SilentReporter())

@@ -28,7 +28,7 @@ from pbem.contact.modes import Linearisation, linearise
 from pbem.heap import heap
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
-from pbem.parallel import add_up
+from pbem.parallel import add_up_there
 from pbem.solve.preconditioner.near_map import NearMap
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain, find_nearest
@@ -116,22 +116,27 @@ class Sweeps:
         """
         problem, laws, pairs = self._problem, self._problem.laws, self.parts.pairs
         subset = take_subset(laws, memory, load.pressure, modes, pairs)
-        state = evaluate_pairs(problem.mesh, law, solved.unknowns)
-        values = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
+        values = np.stack([*vars(evaluate_pairs(problem.mesh, law, solved.unknowns)).values()], axis=1)
         values[:, :2] /= problem.traction_scale
         for sweep in range(MOST_SWEEPS):
             if sweep:
                 values[:, :2] = self.find_tractions(load, solved, values[:, 2:])
             start = replace(subset, modes=ModeState(modes.mode[pairs], modes.sign[pairs]))
             settled, reached = self._settle_groups(start, values[pairs], judge, sweep > 0)
-            found = np.zeros((len(values), 6))
-            found[pairs[self.parts.owned]] = np.column_stack([settled.mode, settled.sign, reached])[self.parts.owned]
-            found = add_up(problem.comm, found)[laws.leader]
-            before, modes = modes, follow_leaders(laws, ModeState(np.rint(found[:, 0]).astype(np.int8), found[:, 1]))
-            values = found[:, 2:]
+            owned, values = self.parts.owned, np.zeros(values.shape)
+            values[pairs[owned]] = reached[owned]
+            # Of statuses a byte each is sent: what is of the whole model is on every rank at once.
+            code = np.zeros((len(values), 2), dtype=np.int8)
+            code[pairs[owned], 0], code[pairs[owned], 1] = settled.mode[owned], settled.sign[owned]
+            add_up_there(problem.comm, values)
+            add_up_there(problem.comm, code)
+            before, modes = modes, follow_leaders(laws, ModeState(code[:, 0], code[:, 1].astype(float)))
+            if laws.follows.any():
+                values = values[laws.leader]
             if modes.fingerprint() == before.fingerprint():
                 break
-        return modes, values * np.array([problem.traction_scale, problem.traction_scale, 1.0, 1.0])
+        values *= np.array([problem.traction_scale, problem.traction_scale, 1.0, 1.0])
+        return modes, values
 
     def _settle_groups(self, subset: Subset, values: Real, judge: Judge, moved: bool) -> tuple[ModeState, Real]:
         """Modes (k,) and values (k, 4) of the groups' pairs from those before, by Newton's steps in every group.
@@ -179,7 +184,7 @@ class Sweeps:
         place = np.searchsorted(problem.system.nodes, mesh.pairs.slave[self._held])
         result = np.zeros((mesh.pairs.count, 2))
         result[self._held] = -(self.parts.soften(self._held) @ equations[place][..., None])[..., 0]
-        return add_up(problem.comm, result)
+        return add_up_there(problem.comm, result)
 
 
 def _divide(mesh: Mesh, groups: Iterable[Subdomain]) -> Iterator[tuple[Integer, Integer]]:

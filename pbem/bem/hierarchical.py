@@ -31,9 +31,11 @@ from pbem.bem.rows import Sources, evaluate_rows
 from pbem.bem.seen_entries import SeenEntries, take_elements
 from pbem.bem.sharing import Share
 from pbem.bem.tree import RATIO, Forest, build_forest, find_interactions
+from pbem.formed import form_runs
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
+from pbem.uniform import fold_uniform
 
 # Elements in a leaf at most: fewer make more work of the expansions, more make more of the near elements.
 LEAF_ELEMENTS = 8
@@ -266,7 +268,8 @@ def assemble_hierarchical(
     none = sparse.csr_matrix((2 * len(nodes), len(sums.number)))
     operator = HierarchicalOperator(
         parts, nodes, sources, targets, NearRows(leaves, seen.count, 2 * len(nodes)),
-        _place_far_rows(parts, far, targets, row_of_node, scale), seen.place_columns(free), needed,
+        _place_far_rows(parts, far, targets, row_of_node, scale), seen.place_columns(free),
+        form_runs(fold_uniform(needed)),
         seen, np.searchsorted(seen.elements, sources.elements), sums,
         sparse.csr_matrix((seen.count, len(sums.number))), none, rigid,
     )  # fmt: skip

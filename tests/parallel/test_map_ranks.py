@@ -15,6 +15,7 @@ from __future__ import annotations
 import json, sys
 import numpy as np
 from scipy import sparse
+from pbem import formed
 from pbem.bem import hierarchical
 from pbem.case.build import read_model
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
@@ -25,6 +26,7 @@ from pbem.parallel import world
 from pbem.solve.preconditioner import subdomains
 from pbem.solve.system.assembly import assemble_problem
 
+formed.LARGE = 1
 hierarchical.LEAF_ELEMENTS = hierarchical.SMALL_REGION = 4
 subdomains.ONE_GROUP, subdomains.NEIGHBOUR_UNKNOWNS = 0, 50
 """
@@ -46,9 +48,11 @@ for apart in (problem, modes, memory, solved, tangent.solution, tangent.precondi
     list_arrays(apart, seen)
 pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
 far = [array.size for array in list_arrays(load, set(seen))]
-held = [array.size for array in list_arrays([law, constraints, tangent.product, tangent.preconditioner], seen)]
+held = [array.size for array in list_arrays([
+    law, constraints, tangent.product, tangent.preconditioner], seen)]
 whole = problem.constrain(law, load)
 found = world.gather({
+    "mesh": max(array.size for array in list_arrays([problem.mesh, problem.laws], set())),
     "held": max(held), "far": max(far),
     "off": float(np.abs(v - whole.evaluate(solved.unknowns)).max() / np.abs(v).max()),
     "residual": problem.measure(problem.apply(v, load)) / problem.measure(problem.apply(whole.offset, load)),
@@ -68,6 +72,8 @@ def test_no_rank_forms_all_laws_fields_or_the_whole_map(tmp_path: Path) -> None:
     run = launch_snippet(ranks, SNIPPET + inspect.getsource(list_arrays) + SOLVED, case)
     assert run.returncode == 0, run.stderr
     for share in json.loads(run.stdout):
+        # Of the mesh and the laws the ends of elements are the largest array, with a number for six unknowns.
+        assert share["mesh"] <= share["unknowns"] / 6
         assert share["held"] < 4 * share["unknowns"] / ranks
         assert share["far"] < 1.5 * share["unknowns"] / ranks  # displacement and traction, complex
         assert share["law"] < 1e-12 and share["scales"] == 1

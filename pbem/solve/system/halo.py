@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.bem.sharing import Ghosts, Share
+from pbem.formed import form_runs
 from pbem.parallel import add_up, keep_duplicate
 
 # Of all messages here: on this communicator nothing else sends from rank to rank, and these arrive in their order.
@@ -179,4 +180,4 @@ def share_elements(comm: MPI.Intracomm, groups: list[Integer], bounds: Sequence[
     for rank, (first, last) in enumerate(bounds):
         for group in groups[first:last]:
             of_element[group] = rank
-    return Share(AllRanks(keep_duplicate(comm)), of_element)
+    return Share(AllRanks(keep_duplicate(comm)), form_runs(of_element))

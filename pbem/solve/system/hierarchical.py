@@ -102,7 +102,8 @@ class HierarchicalSystem:
             operator=operator,
             crack_points=place_nodes_on_cracks(operator, own_cracks) if mesh.crack.any() else None,
             groups=surround_groups(mesh, groups, first, last),
-            widen_groups=lambda widening: surround_groups(mesh, groups, first, last, widening),
+            # Divided once more, as the small arrays of all groups would take room on every rank.
+            widen_groups=lambda widening: surround_groups(mesh, divide_model(mesh), first, last, widening),
             tolerance=model.solver.tolerance,
             notes=(_describe_operator(operator, by_bodies, len(groups), model.solver.tolerance, error),),
             by_bodies=by_bodies is not None,

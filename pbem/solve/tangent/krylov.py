@@ -88,6 +88,7 @@ class KrylovTangent(TangentOperator):
         self.product, self._shared = SharedProduct(problem, shared), shared
         self._groups, self._widen_groups = groups, widen
         self.constraints: ConstraintMap | None = None
+        # Whole: what is remembered is stored, and taken up on any number of ranks.
         self.solution: Real | None = None
         self.law: Linearisation | None = None
         # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
@@ -148,6 +149,7 @@ class KrylovTangent(TangentOperator):
             self._parts.form(law, self._local.divide(load).parts)
         else:
             self.preconditioner.update(constraints)
+        heap.give_back()
 
     def _take_map(self, constraints: ConstraintMap) -> None:
         """Take a constraint map; the directions of GMRES are dropped where they are those of another operator."""

@@ -15,24 +15,15 @@ from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.between import Violations
 from pbem.results.differences import bound_reactions, measure_energy, subtract_displacements, sum_reactions, sum_sizes
-from pbem.results.rates import (
-    EndFinder,
-    choose_force_divisor,
-    choose_jump_divisors,
-    find_weak_ends,
-    list_factor_shares,
-    list_force_shares,
-)
+from pbem.results.divisors import Divisors
+from pbem.results.rates import EndFinder, Ends
 from pbem.results.short_zones import bound_short_zones
+from pbem.results.stiff_tips import StiffTips
 from pbem.results.stuck_ends import StuckEnds
 from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
 
-# The error of the second solution over that of the run, less one, by order: 2^rate - 1 for the rate order + 1, at most
-# 5; with the order lowered by one. Measured over the problems with known answers by scripts/bench_estimate.py.
-MERGED = (1.0, 3.0, 5.0, 5.0)
-LOWERED = 5.0
 # Of the largest displacement: jumps and factors below are rounding, and have no relative error.
 ROUNDING = 1e-8
 # Of the modulus times the largest displacement over the model's size: no traction is known better. Nor is the modulus
@@ -117,23 +108,17 @@ class Comparison:
         self._interfaces = list(self._sorted.values())
         self._known, self._as_they_are = rules, as_they_are
         self._absence = Absence(model, mesh, np.zeros(0, dtype=np.int64))
-        # A stiff region goes along with a soft one: the energy of that is none of its own.
-        self._modulus = np.array([region.material.plane_modulus for region in model.regions])[mesh.region]
+        self._softest = min((region.material.plane_modulus for region in model.regions), default=np.inf)
         laws = collect_laws(model, mesh)
-        self._gap, self._stuck_ends = laws.gap, StuckEnds(model, mesh, laws)
+        self._gap = laws.gap
+        self._stuck_ends, self._stiff_tips = StuckEnds(model, mesh, laws), StiffTips(model, mesh, laws)
         self.energy, self.jumps = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
         self.scales = Scales()
         if beside is not None:
             self._others = list(sort_pairs(beside.mesh).items())
             self._other_gap = collect_laws(beside.model, beside.mesh).gap
-            smooth = MERGED[model.analysis.order] if beside.kind == "merged" else LOWERED
-            self._divisor = 1.0 if as_they_are else smooth
-            self._least_factor_error = 0.0 if as_they_are else LEAST_FACTOR_ERROR
             self._ends = EndFinder(mesh, beside)
-            self._jump_divisor = choose_jump_divisors(model, beside, self._divisor)
-            self._weak = find_weak_ends(model, beside)
-            self._force_shares = list_force_shares(model, beside, self._divisor)
-            self._factor_shares = list_factor_shares(model, beside, self._divisor)
+            self._divisors = Divisors(model, beside, as_they_are)
 
     @cached_property
     def _rules(self) -> TipRules:
@@ -189,11 +174,12 @@ class Comparison:
             estimates = self._know_nothing()
         else:
             energy = measure_energy(self._model, self._mesh, self._beside, step, second)
-            least = self._bound_jumps(step)
-            self._away = self._choose_divisor(energy, self._factor_shares)  # of factors, and of jumps off corners
-            estimates = self._subtract(step, second, self._beside, energy, least)
+            least, ends = self._bound_jumps(step), self._ends.find(step.contact, second.contact)
+            by = self._divisors.of_jumps(ends, energy)
+            jumps = self._divide_jumps(step.contact, second.contact, self._beside, by)
+            estimates = self._subtract(step, second, self._beside, energy, least, jumps, ends)
             self.energy = np.maximum(self.energy, energy)
-            located = self._locate_jumps(step.contact, second.contact, self._beside, least)
+            located = self._locate_jumps(jumps, self._beside, least)
             self.jumps = np.maximum(self.jumps, located)
         return estimates, self._relate(estimates)
 
@@ -202,30 +188,29 @@ class Comparison:
         return Estimates(**{each.name: nothing[each.name] for each in fields(Estimates) if nothing[each.name].ndim},
                          displacement=np.nan)
 
-    def _subtract(self, step: Step, second: Step, beside: Beside, energy: Real, least_jumps: Real) -> Estimates:
-        """What the two solutions differ by, over the divisors (theory, 77); least_jumps: of `_bound_jumps`."""
+    def _subtract(
+        self, step: Step, second: Step, beside: Beside, energy: Real, least_jumps: Real, jumps: Real, ends: Ends
+    ) -> Estimates:
+        """What the two solutions differ by, over the divisors (theory, 77); least_jumps: of `_bound_jumps`, jumps: of
+        `_divide_jumps`."""
         mine, other = sum_reactions(self._model, self._mesh, step), sum_reactions(beside.model, beside.mesh, second)
-        forces = (mine - other) / self._choose_divisor(energy, self._force_shares)
-        opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)
+        forces = (mine - other) / self._divisors.of_forces(energy)
+        opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside, jumps, ends)
         of_zones = [least_jumps[own].max(axis=0) for own in self._interfaces]
         opening, slip = np.maximum([opening, slip], np.reshape(of_zones, (-1, 2)).T)
         both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
         cracks = len(self._model.crack_tips)  # the two meshes need not see the same cracks along interfaces
-        factors = [np.abs(one[:cracks] - two[:cracks]) / self._away for one, two in zip(*both, strict=True)]
-        moved = subtract_displacements(self._mesh, beside, step, second)
-        least = self._bound_factors(step.contact, np.fmax(opening, slip))
-        KI, KII = (np.maximum(each, least) for each in factors)
+        by = self._divisors.of_factors(energy)
+        factors = [np.abs(one[:cracks] - two[:cracks]) / by for one, two in zip(*both, strict=True)]
+        moved = subtract_displacements(self._mesh, beside, step, second) / self._divisors.of_displacements(energy)
+        KI, KII = np.maximum(factors, self._bound_factors(step, np.fmax(opening, slip)))
         reactions = np.abs(np.stack([forces.real, forces.imag], axis=1))
         if not self._as_they_are:
             reactions = np.maximum(reactions, bound_reactions(self._model, self._mesh, step))
         return Estimates(
             reactions, opening, slip, traction_n, traction_s, KI, KII,
-            _largest(np.abs(moved[~beside.mesh.node_crack])) / self._divisor,
+            _largest(np.abs(moved[~beside.mesh.node_crack])),
         )
-
-    def _choose_divisor(self, energy: Real, shares: Real | None) -> float:
-        square = energy.sum(axis=0) / self._modulus
-        return choose_force_divisor(square, shares if self._divisor > 1 else None, self._divisor)
 
     def _bound_jumps(self, step: Step) -> Real:
         """The least errors (m, 2) of opening and slip at the run's pairs."""
@@ -235,22 +220,28 @@ class Comparison:
         of_zones = bound_short_zones(self._model, self._sorted, contact.opening - self._gap, contact.slip)
         return np.maximum(of_zones, self._stuck_ends.bound(replace(step, contact=contact)))
 
-    def _bound_factors(self, contact: ContactState, jumps: Real) -> Real:
-        """The least error (cracks, 2) of the factors of each crack for the errors (i,) of the interfaces' jumps."""
-        KI, KII = self._rules.evaluate_factors(contact)
+    def _bound_factors(self, step: Step, jumps: Real) -> Real:
+        """The least errors (2, cracks, 2) of KI and KII of each crack for the errors (i,) of the interfaces' jumps."""
+        contact = step.contact
+        factors = np.stack(self._rules.evaluate_factors(contact))[:, : len(self._model.crack_tips)]
+        if self._as_they_are:
+            return np.zeros(factors.shape)
         number = {name: i for i, name in enumerate(sort_pairs(self._mesh))}
         least = np.zeros((len(self._model.crack_tips), 1))
         for crack, name in enumerate(self._model.crack_tips):
             own = self._interfaces[number[name]]
             largest = max(_largest(contact.opening[own] - self._gap[own]), _largest(contact.slip[own]))
-            factor = max(_largest(KI[crack]), _largest(KII[crack]))
-            least[crack] = self._least_factor_error * jumps[number[name]] / largest * factor if largest > 0 else 0.0
-        return least if self._as_they_are else np.fmax(least, self._rules.bound_short(KI, KII)[: len(least)])
+            factor = _largest(factors[:, crack])
+            least[crack] = LEAST_FACTOR_ERROR * jumps[number[name]] / largest * factor if largest > 0 else 0.0
+        least = np.fmax(least, self._rules.bound_short(*factors))
+        return np.fmax(least, self._stiff_tips.bound(step, factors))
 
-    def _subtract_pairs(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real, Real, Real]:
+    def _subtract_pairs(
+        self, mine: ContactState, other: ContactState, beside: Beside, jumps: Real, ends: Ends
+    ) -> tuple[Real, Real, Real, Real]:
         """Per interface (i,): estimated errors, of opening and slip the largest, of the tractions the mean ones."""
-        opening, slip = (self._divide_jumps(name, mine, other, beside) for name in JUMPS)
-        normal, tangential = self._subtract_tractions(mine, other, beside)
+        opening, slip = jumps
+        normal, tangential = self._subtract_tractions(mine, other, beside, ends)
         weight = beside.mesh.pairs.weight
         borne = weight * (other.traction_n**2 + other.traction_s**2)
         of = dict(self._others)
@@ -269,17 +260,19 @@ class Comparison:
         table = np.array(found).reshape(-1, 4)
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
 
-    def _divide_jumps(self, name: str, mine: ContactState, other: ContactState, beside: Beside) -> Real:
-        """Estimated errors at the pairs of the second solution.
+    def _divide_jumps(self, mine: ContactState, other: ContactState, beside: Beside, by: Real) -> Real:
+        """Estimated errors (2, c) of opening and slip at the pairs of the second solution; by (c,): the divisors.
 
         Where displacements follow a power near zero differences are divided by next to nothing, but jumps that are to
         vanish at a crack's end are off by no more than what they are.
         """
-        differences = self._subtract_jumps(name, mine, other, beside)
-        errors = differences / np.minimum(self._jump_divisor, self._away)
-        most = np.abs(getattr(other, name) - (self._other_gap if name == "opening" else 0.0))
-        most = np.maximum(most, np.abs(differences))
-        return np.asarray(np.where(self._weak, np.clip(errors, -most, most), errors))
+        found = []
+        for name in JUMPS:
+            differences = self._subtract_jumps(name, mine, other, beside)
+            most = np.abs(getattr(other, name) - (self._other_gap if name == "opening" else 0.0))
+            most = np.maximum(most, np.abs(differences))
+            found.append(np.where(self._divisors.weak, np.clip(differences / by, -most, most), differences / by))
+        return np.stack(found)
 
     def _subtract_jumps(self, name: str, mine: ContactState, other: ContactState, beside: Beside) -> Real:
         """Differences at the pairs of the second solution; zero where the run has none."""
@@ -289,21 +282,21 @@ class Comparison:
             values = values - (beside.carry_pairs(self._gap, True) - self._other_gap)
         return np.where(beside.seen, values, 0.0)
 
-    def _subtract_tractions(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real]:
+    def _subtract_tractions(
+        self, mine: ContactState, other: ContactState, beside: Beside, ends: Ends
+    ) -> tuple[Real, Real]:
         """Estimated errors at the pairs of the second solution; zero where the run has none."""
-        ends = self._ends.find(mine, other)
-        by = np.where(beside.seen, 1.0 / ends.choose_divisors(self._divisor), 0.0)
-
-        def subtract(name: str) -> Real:
+        found = np.zeros((2, len(beside.seen)))
+        for difference, name in zip(found, ("traction_n", "traction_s"), strict=True):
             own = getattr(mine, name)
             carried = np.where(ends.mixed, self._ends.read_between(own), beside.carry_pairs(own, False))
-            return np.asarray(by * (carried - getattr(other, name)))
+            difference[beside.seen] = (carried - getattr(other, name))[beside.seen]
+        normal, tangential = found / self._divisors.of_tractions(ends, found)
+        return normal, tangential
 
-        return subtract("traction_n"), subtract("traction_s")
-
-    def _locate_jumps(self, mine: ContactState, other: ContactState, beside: Beside, least: Real) -> Real:
-        """Estimated error of the jumps on each element of the run (e,), over the largest jump so far; least: of
-        `_bound_jumps`.
+    def _locate_jumps(self, jumps: Real, beside: Beside, least: Real) -> Real:
+        """Estimated error of the jumps on each element of the run (e,), over the largest jump so far; jumps: of
+        `_divide_jumps`, least: of `_bound_jumps`.
 
         The mean over each coarse element is left out: it comes from elsewhere.
         """
@@ -313,8 +306,7 @@ class Comparison:
         if self.scales.jumps > ROUNDING * self.scales.displacement:
             at_least = least.max(axis=1) / self.scales.jumps
             np.maximum.at(result, self._mesh.pairs.slave // (self._mesh.order + 1), at_least)
-            for name in JUMPS:
-                errors = self._divide_jumps(name, mine, other, beside) / self.scales.jumps
+            for errors in jumps / self.scales.jumps:
                 mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
                 errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
                 np.maximum.at(result, element, np.abs(errors))
@@ -331,7 +323,7 @@ class Comparison:
         scales, size = self.scales, self._model.size
         moved, rounding = scales.displacement, ROUNDING * scales.strained
         # Under in-situ stress nothing but rounding may have moved yet.
-        borne = max(scales.peak, scales.reactions / size) * size / self._modulus.min(initial=np.inf)
+        borne = max(scales.peak, scales.reactions / size) * size / self._softest
         return Relative(
             reactions=_divide(_worst(estimates.reactions), scales.reactions, rounding * size),
             jumps=_divide(max(_worst(estimates.opening), _worst(estimates.slip), key=_nan_first), scales.jumps,

@@ -27,6 +27,14 @@ from pbem.solve.problem.step import ContactState
 # that begins where two elements meet the mean error falls with the length (2 - 1). Within an element it depends on
 # where: three times as large on the coarser mesh, measured over cylinders, pins and layers (scripts/bench_estimate.py).
 FIXED, MOVING = 1.0, 2.0
+# Openings and slips follow this power of the distance from such an end, whatever the order (scripts/bench_estimate.py;
+# where it lies in an element their error falls no faster).
+KINK = 1.5
+# Tractions in corners of faces in contact follow powers of the distance from 0 to -0.46; their mean error falls with
+# half a power more, here that of -0.2: measured over blocks, wedges and press fits.
+TRACTION_RATE = 0.3
+# They are singular where differences in the corner are so many times as large as on the next element.
+RISE = 3.0
 # That of jumps on the elements of the second solution next to a tip, so many of them: between the power 3/2, which
 # would give 1.8, and smooth fields (scripts/bench_estimate.py --accuracy).
 TIP, AT_TIP = 4.0, 2
@@ -58,6 +66,10 @@ class Ends:
         """What differences of tractions (c,) are to be divided by; smooth: away from ends (theory, 77)."""
         at_end = np.where(self.moving, min(MOVING, smooth), min(FIXED, smooth))
         return np.where(self.beside, at_end, smooth)
+
+    def choose_jump_divisors(self, away: Real, at_end: float) -> Real:
+        """What differences of jumps (c,) are to be divided by: `away` (c,), at these ends no more than `at_end`."""
+        return np.where(self.beside, np.minimum(away, at_end), away)
 
 
 class EndFinder:
@@ -93,29 +105,60 @@ class EndFinder:
 
 
 def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
-    """What differences of jumps at the pairs of the second solution (c,) are divided by (theory, 126).
+    """What differences of displacements, on cracks of jumps, on the elements of the second solution (e,) are divided by
+    (theory, 126).
 
     model: of the run; smooth: away from tips and corners.
     """
     coarse, result = beside.mesh, np.full(beside.mesh.elements, smooth)
-    at_tip = TIP if beside.kind == "merged" else _find_rise(beside, 1.0, PAST_ROOT) - 1
+    at_tip = TIP if beside.kind == "merged" else find_rise(beside, 1.0, PAST_ROOT) - 1
     at_corner = _list_merged_ends(model, beside.model)
     for name, own in list_curve_elements(beside.model, coarse):
         at_start, at_end = model.crack_tips.get(name, (False, False))
         result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(at_tip, smooth)
         for element, ratio, power in at_corner.get(name, ()):
-            result[own[element]] = min(result[own[element]], CORNER, _find_rise(beside, ratio, power) - 1)
-    return np.asarray(result[coarse.pairs.slave // (coarse.order + 1)])
+            result[own[element]] = min(result[own[element]], CORNER, find_rise(beside, ratio, power) - 1)
+    return result
+
+
+@dataclass(frozen=True)
+class CornerElements:
+    """Elements (k,) of the second solution in corners, the elements next to them on their curves (-1: none), and what
+    differences of tractions that are singular there are divided by."""
+
+    element: Integer
+    beyond: Integer
+    divisor: Real
+
+    def choose_divisors(self, away: float, size: Real) -> Real:
+        """What differences of tractions on all elements (e,) are divided by; away from corners by `away`.
+
+        size (e,): of the differences, squared. Of smooth tractions they are the same on the next element.
+        """
+        result = np.full(len(size), away)
+        rises = (self.beyond < 0) | (size[self.element] > RISE**2 * size[self.beyond])
+        np.minimum.at(result, self.element[rises], self.divisor[rises])
+        return result
+
+
+def list_corner_elements(model: Model, beside: Beside) -> CornerElements:
+    """The elements in corners of the mesh beside that of a model (theory, 126)."""
+    at_corner, rows = _list_merged_ends(model, beside.model), []
+    for name, own in list_curve_elements(beside.model, beside.mesh):
+        for number, ratio, _ in at_corner.get(name, ()):
+            along = [own[k] for k in (number + 1, number - 1) if 0 <= k < len(own)]
+            rows.append((own[number], along[0] if along else -1, find_rise(beside, ratio, TRACTION_RATE) - 1))
+    table = np.array(rows, dtype=float).reshape(-1, 3)
+    return CornerElements(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2])
 
 
 def find_weak_ends(model: Model, beside: Beside) -> Bool:
-    """Pairs of the second solution (c,) on elements beside ends of cracks on interfaces with a softer material, where
-    jumps that vanish at the end follow a power below WEAK; model: of the run."""
-    coarse, weak = beside.mesh, np.zeros(beside.mesh.elements, dtype=bool)
-    at_corner = _list_merged_ends(model, beside.model)
-    for name, own in list_curve_elements(beside.model, coarse):
+    """Elements of the second solution (e,) beside ends of cracks on interfaces with a softer material, where jumps that
+    vanish at the end follow a power below WEAK; model: of the run."""
+    weak, at_corner = np.zeros(beside.mesh.elements, dtype=bool), _list_merged_ends(model, beside.model)
+    for name, own in list_curve_elements(beside.model, beside.mesh):
         weak[own[[element for element, _, power in at_corner.get(name, ()) if power < WEAK]]] = True
-    return np.asarray(weak[coarse.pairs.slave // (coarse.order + 1)])
+    return weak
 
 
 def find_corner_power(turn: float) -> float:
@@ -173,11 +216,11 @@ def _list_shares(
             rate = find_rate(name, power)
             if rate is not None:
                 at = fine[own[element]]
-                by[at] = np.maximum(by[at], 1 / (_find_rise(beside, ratio, rate) - 1))
+                by[at] = np.maximum(by[at], 1 / (find_rise(beside, ratio, rate) - 1))
     return by
 
 
-def _find_rise(beside: Beside, ratio: float, power: float) -> float:
+def find_rise(beside: Beside, ratio: float, power: float) -> float:
     """How many times as large errors are in the second solution that fall with a power of the length of an element,
     `ratio` times as long in it; where the order is lowered, with twice that power of the number of nodes (theory, 126).
     """

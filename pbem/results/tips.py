@@ -86,12 +86,13 @@ class TipRules:
             self.groups[number].forms.take(forms)
 
     def bound_short(self, KI: Real, KII: Real) -> Real:
-        """The least errors of K (cracks, 2), by K as of `evaluate_factors`: not zero where few elements lie between a
-        tip and what meets the crack."""
+        """The least errors of K (cracks, 2), by K as of `evaluate_factors`, or of the first cracks: not zero where few
+        elements lie between a tip and what meets the crack."""
         short = np.zeros(len(self.is_tip), dtype=bool)
         for group in self.groups:
             short[group.tip] = group.forms.is_short
         largest = np.fmax(np.abs(KI), np.abs(KII))
+        short = short[: largest.size]
         return np.where(short.reshape(-1, 2), SHORT_ERROR[self.mesh.order] * largest, 0.0)
 
     def evaluate(self, contact: ContactState) -> dict[str, tuple[Real, Real]]:

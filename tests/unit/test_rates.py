@@ -16,14 +16,18 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import count_elements
 from pbem.results.accuracy import Decision, mark_contacts, mark_elements, refine_marked
+from pbem.results.divisors import Divisors
 from pbem.results.rates import (
     CORNER,
     FORCE_RATE,
     TIP,
+    TRACTION_RATE,
+    Ends,
     choose_force_divisor,
     choose_jump_divisors,
     find_corner_power,
     find_weak_ends,
+    list_corner_elements,
     list_factor_shares,
     list_force_shares,
 )
@@ -68,11 +72,9 @@ def put(model: Model) -> Beside:
 
 
 def read_elements(beside: Beside, name: str, values: np.ndarray) -> np.ndarray:
-    """Values of the pairs on a crack's elements, in the direction of its curve."""
-    own = next(elements for curve, elements in list_curve_elements(beside.model, beside.mesh)
-               if curve == name and np.isin(elements * (beside.mesh.order + 1), beside.mesh.pairs.slave).all())
-    of = {int(e): value for e, value in zip(beside.mesh.pairs.slave // (beside.mesh.order + 1), values, strict=True)}
-    return np.array([of[int(e)] for e in own])
+    """Values (e,) of a curve's elements, on its first face, in the direction of the curve."""
+    own = next(elements for curve, elements in list_curve_elements(beside.model, beside.mesh) if curve == name)
+    return np.asarray(values[own])
 
 
 @pytest.mark.parametrize(("turn", "power"), [(90.0, 0.544484), (60.0, 0.615731), (120.0, 0.512221), (180.0, 0.5)])
@@ -121,6 +123,43 @@ def test_differences_at_a_corner_say_more_where_its_elements_were_much_shorter(p
     divisor = 4 ** find_corner_power(math.radians(60)) - 1
     assert read_elements(beside, "leg", choose_jump_divisors(graded, beside, SMOOTH))[-1] == pytest.approx(divisor)
     assert read_elements(beside, "leg", choose_jump_divisors(graded, beside, 1.0))[-1] == 1.0
+    # Mean errors of a traction that is singular fall with a small power of the length.
+    corners, size = list_corner_elements(graded, beside), np.ones(beside.mesh.elements)
+    last = next(elements for curve, elements in list_curve_elements(beside.model, beside.mesh) if curve == "leg")[-1]
+    assert (corners.choose_divisors(SMOOTH, size) == SMOOTH).all()  # smooth ones, which differ alike everywhere
+    size[last] = 10.0
+    expected = np.where(np.arange(len(size)) == last, 4**TRACTION_RATE - 1, SMOOTH)
+    np.testing.assert_allclose(corners.choose_divisors(SMOOTH, size), expected)
+
+
+def test_errors_against_a_finer_solution_are_divided_by_nothing(plate: Model) -> None:
+    # Where a crack turns the divisor is less than 1: the true error would be called larger than it is.
+    beside = put(plate)
+    energy = np.ones((2, beside.fine.elements))
+    ends = Ends(*np.zeros((3, beside.mesh.pairs.count), dtype=bool))
+    found, usual = Divisors(plate, beside, as_they_are=True), Divisors(plate, beside)
+    assert found.of_forces(energy) == found.of_factors(energy) == 1.0
+    own = beside.mesh.pairs.slave // (beside.mesh.order + 1)
+    tractions = np.stack([own == take_element(beside.model, beside.mesh, "wing", 0), own < 0]).astype(float)
+    given = {"of_jumps": (ends, energy), "of_tractions": (ends, tractions), "of_displacements": (energy,)}
+    for name, values in given.items():
+        assert (getattr(found, name)(*values) == 1.0).all() and getattr(usual, name)(*values).min() < 1
+
+
+def test_jumps_beside_an_end_of_contact_fall_with_the_power_three_halves(plate: Model) -> None:
+    # Of d^(3/2) on elements twice as long, whatever the order; with two nodes in place of three 1.5^3.
+    beside = put(plate)
+    side = replace(plate.curves["left"].legs[0], elements=1)
+    lowered = put_beside(single := replace(plate, curves=plate.curves | {"left": Curve("left", (side,))}),
+                         generate_mesh(single))
+    assert lowered is not None and lowered.kind == "order"
+    for model, other, expected in ((plate, beside, 2**1.5 - 1), (single, lowered, 1.5**3 - 1)):
+        at_end = np.zeros(other.mesh.pairs.count, dtype=bool)
+        own = other.mesh.pairs.slave // (other.mesh.order + 1)
+        at_end[middle := own == read_elements(other, "leg", np.arange(other.mesh.elements))[2]] = True
+        divisors, energy = Divisors(model, other), np.zeros((2, other.fine.elements))
+        np.testing.assert_allclose(divisors.of_jumps(Ends(at_end, at_end, at_end), energy)[middle], expected)
+        assert (divisors.of_jumps(Ends(~at_end, at_end, at_end), energy)[middle] == SMOOTH).all()
 
 
 def test_differences_of_forces_are_divided_by_where_they_come_from(plate: Model) -> None:

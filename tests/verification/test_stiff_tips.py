@@ -1,0 +1,73 @@
+"""Estimated errors of K where elastic joints take up the stress within an element of the tip: two solutions agree."""
+
+from __future__ import annotations
+
+import cmath
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbem.case.build import parse_model
+from pbem.results import stiff_tips
+from pbem.storing import make_estimator
+from tests.verification.proofs.proof import Solved, solve_model, write_case
+
+YOUNG, POISSON, HALF = 70.0, 0.3, 2.5
+MODULUS = YOUNG / (1 - POISSON**2)
+
+
+def make_crack(
+    stiffness: float, elements: int, order: int, *, turn: float = 0.0, unit: float = 1.0, stress: float = 1.0,
+    **law: Any,
+) -> Solved:
+    """A closed crack of length 2 HALF, sheared, whose joint has a stiffness in E' over HALF."""
+    along, joint = cmath.rect(HALF * unit, turn), stiffness * MODULUS * stress / (HALF * unit)
+    spin = cmath.exp(2j * turn)
+    mean, deviator = -1.2 * stress, (0.1 + 0.5j) * spin * stress
+    tables = {
+        "materials": {"rock": {"young": YOUNG * stress, "poisson": POISSON}},
+        "curves": {"crack": {"points": [-along, along], "elements": elements}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}},
+        "interfaces": {"crack": {"law": "coulomb", "friction": 2.0, "normal_stiffness": joint,
+                                 "tangential_stiffness": joint, **law}},
+        "remote": {"sxx": mean + deviator.real, "syy": mean - deviator.real, "sxy": deviator.imag},
+        "analysis": {"order": order, "steps": 1},
+    }  # fmt: skip
+    return solve_model(parse_model(write_case(tables))[1])
+
+
+def estimate(solved: Solved) -> np.ndarray:
+    """The estimated errors (2, 2) of KI and KII at both ends."""
+    estimator = make_estimator(solved.model, solved.mesh)
+    row = [estimator.estimate(step) for step in solved.steps][-1]
+    estimator.destroy()
+    return np.array([row["KI"][0], row["KII"][0]])
+
+
+# Elements of 0.6 to 8 times the distance over which the joint takes up the stress.
+@pytest.mark.parametrize(("order", "elements"), [(1, 8), (2, 6), (3, 5)])
+@pytest.mark.parametrize("stiffness", [3.0, 20.0])
+def test_the_error_of_k_with_a_joint_is_that_estimated(order: int, elements: int, stiffness: float) -> None:
+    solved = make_crack(stiffness, elements, order, turn=0.4)
+    exact = np.array(make_crack(stiffness, 120, 3, turn=0.4).factors("crack"))
+    ratios = np.abs(solved.factors("crack") - exact) / estimate(solved)
+    assert (ratios > 0.2).all() and (ratios < 2).all()
+
+
+def test_what_a_joint_takes_up_does_not_depend_on_units_or_directions(monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = estimate(make_crack(20.0, 6, 2))
+    other = estimate(make_crack(20.0, 6, 2, turn=2.0, unit=1e3, stress=1e-6))
+    np.testing.assert_allclose(other, expected * 1e-6 * 1e3**0.5, rtol=1e-6)
+    # Without it estimates are a fourth of the error and less.
+    monkeypatch.setattr(stiff_tips, "FACTOR", (0.0,) * 4)
+    assert (estimate(make_crack(20.0, 6, 2)) < 0.3 * expected).all()
+
+
+def test_open_faces_and_soft_joints_have_no_such_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    for law, stiffness in (({"pressure": 3.0, "tensile_strength": 0.01, "cohesion": 1.0}, 20.0), ({}, 1e-3)):
+        solved = make_crack(stiffness, 6, 2, **law)
+        with monkeypatch.context() as patch:
+            patch.setattr(stiff_tips, "FACTOR", (0.0,) * 4)
+            expected = estimate(solved)
+        np.testing.assert_array_equal(estimate(solved), expected)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Bool, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.end_grading import ContactEnd
@@ -34,6 +34,8 @@ LEAST_LIMIT = 4000
 
 # Part of the estimated energy of the error in the elements that are refined: near the goal, and far from it.
 PART, LARGE_PART = 0.7, 0.9
+# Where only jumps are off, and in single places: there elements are refined in any case.
+SMALL_PART = 0.3
 FAR = 8.0
 # Elements with this part of the largest energy are refined in any case: where errors are spread evenly, to refine some
 # of them alone brings nothing.
@@ -41,6 +43,8 @@ ALIKE = 0.1
 # Far from the goal elements in corners are halved twice where no larger part of all is marked, as else errors come from
 # everywhere, and where cracks turn, as the power is known to be small there.
 FEW = 0.25
+# By their errors up to so many times more than once, of jumps that fall with this power of the length.
+MOST_DEEPER, CORNER_RATE = 3, 0.5
 # And those with nearly the energy of the last one that is: what is symmetrical stays so.
 AS_LAST = 0.9
 # And those whose jumps are off by more than this part of the error that the estimates may have.
@@ -54,7 +58,7 @@ MOST_OF_LEG = 0.4
 # A kind of energy with less than this part of all is left out.
 SMALL_KIND = 1e-3
 # Of the largest error of a jump: elements beyond are refined.
-NEAR_WORST = 0.3
+NEAR_WORST = 0.1
 
 
 # Why errors are not known that will be on a finer mesh.
@@ -103,10 +107,12 @@ class Pass:
 class Decision:
     """What follows a pass: sentences for the log; the elements to be halved (gently: see `bisect_elements`; far: those
     in corners twice), None if there is no further pass for the accuracy; why that cannot be reached, empty if it was or
-    was not asked for; where contacts end within elements that are too long, if that is asked for."""
+    was not asked for; where contacts end within elements that are too long, if that is asked for. deeper: how often the
+    elements in corners are to be halved again, per curve as `marked`, if few are."""
 
     notes: tuple[str, ...] = ()
     marked: Mapping[str, Bool] | None = None
+    deeper: Mapping[str, Integer] | None = None
     gently: bool = False
     far: bool = False
     failure: str = ""
@@ -150,24 +156,50 @@ def decide(
     comparison = estimator.comparison
     if not comparison.energy.any():  # gone on with after its last step: where errors are is not in the file
         return Decision((says,), {name: np.zeros(count_elements(curve), bool) for name, curve in model.curves.items()})
-    marked = mark_elements(model, mesh, comparison.energy, comparison.jumps, accuracy, reached.worst)
+    local = _spread_to_curves(model, mesh, comparison.local)
+    others = max((error for name, error in reached.errors.items() if name != ASKED["jumps"]), default=0.0)
+    alone = others * SAFETY <= accuracy and max(each.max(initial=0.0) for each in local.values()) >= 0.5 * reached.worst
+    marked = mark_elements(model, mesh, comparison.energy, comparison.local, accuracy, reached.worst, alone)
+    deeper = {name: count_halvings(each * SAFETY / accuracy) for name, each in local.items()}
     near = reached.worst * SAFETY <= NEAR ** (model.analysis.order + 1) * accuracy
-    return Decision((says,), marked, near, far=reached.worst > FAR * accuracy)
+    return Decision((says,), marked, deeper, near, far=reached.worst > FAR * accuracy)
+
+
+def count_halvings(excess: Real) -> Integer:
+    """How often elements in corners are to be halved after the first time, by their errors over what they may be."""
+    return np.clip(np.ceil(np.log2(np.maximum(excess, 1.0)) / CORNER_RATE) - 1, 0, MOST_DEEPER).astype(np.int64)
 
 
 def refine_marked(model: Model, decision: Decision) -> Model:
-    """The model of the next pass. Far from the goal the marked elements in corners are halved twice: there errors fall
-    with a small power of their length, whatever the order. See FEW."""
+    """The model of the next pass. Where few elements are marked those in corners are halved as often as their errors
+    ask for, far from the goal at least twice: there errors fall with a small power of their length, whatever the order.
+    See FEW."""
     assert decision.marked is not None
     finer = bisect_elements(model, decision.marked, decision.gently)
-    if not decision.far:
-        return finer
-    again = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in finer.curves.items()}
     few = np.concatenate(list(decision.marked.values())).mean() <= FEW
-    for before, after in zip(list_corner_ends(model), list_corner_ends(finer), strict=True):
-        turns = before.curve in model.crack_tips and before.power < 1
-        again[after.curve][after.element] |= (few or turns) and decision.marked[before.curve][before.element]
-    return bisect_elements(finer, again)
+    corners = list_corner_ends(model)
+    again = np.zeros(len(corners), dtype=np.int64)
+    for number, end in enumerate(corners):
+        if decision.marked[end.curve][end.element]:
+            turns = end.curve in model.crack_tips and end.power < 1
+            again[number] = decision.far and (few or turns)
+            if few and decision.deeper is not None:
+                again[number] = max(again[number], decision.deeper[end.curve][end.element])
+    while again.any():
+        marked = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in finer.curves.items()}
+        for end, times in zip(list_corner_ends(finer), again, strict=True):
+            marked[end.curve][end.element] |= times > 0
+        finer = bisect_elements(finer, marked)
+        again = np.maximum(again - 1, 0)
+    return finer
+
+
+def _spread_to_curves(model: Model, mesh: Mesh, values: Real) -> dict[str, Real]:
+    """Per curve the values (e,) of the mesh's elements, the larger of both sides."""
+    by_curve = {name: np.zeros(count_elements(curve)) for name, curve in model.curves.items()}
+    for name, elements in list_curve_elements(model, mesh):
+        by_curve[name] = np.maximum(by_curve[name], values[elements])
+    return by_curve
 
 
 def mark_contacts(model: Model) -> dict[str, Bool]:
@@ -177,20 +209,21 @@ def mark_contacts(model: Model) -> dict[str, Bool]:
 
 
 def mark_elements(
-    model: Model, mesh: Mesh, energy: Real, jumps: Real, accuracy: float, worst: float
+    model: Model, mesh: Mesh, energy: Real, jumps: Real, accuracy: float, worst: float, alone: bool = False
 ) -> dict[str, Bool]:
     """Per curve the elements (along all its legs) to be halved: those with most of the error's energy (Doerfler 1996),
     of the displacements and of the tractions, and those whose jumps are too far off themselves.
 
     energy (2, e), jumps (e,): of each element of the mesh, see `pbem.results.estimates.Comparison`; both sides of a
     curve count together. accuracy, worst: the largest relative error asked for, and the one that is estimated.
+    alone: whether all that is too far off are jumps in single places.
     """
     by_curve = {name: np.zeros((3, count_elements(curve))) for name, curve in model.curves.items()}
     for name, elements in list_curve_elements(model, mesh):
         by_curve[name][:2] += energy[:, elements]
         by_curve[name][2] = np.maximum(by_curve[name][2], jumps[elements])
     *kinds, local = np.concatenate(list(by_curve.values()), axis=1)
-    part = LARGE_PART if worst > FAR * accuracy else PART
+    part = SMALL_PART if alone else LARGE_PART if worst > FAR * accuracy else PART
     chosen = local > max(LOCAL * accuracy / SAFETY, NEAR_WORST * local.max(initial=0.0))
     for each in kinds:
         if each.sum() >= SMALL_KIND * energy.sum():

@@ -105,3 +105,12 @@ def measure_energy(model: Model, mesh: Mesh, beside: Beside, step: Step, second:
         np.bincount(element, (weight * factor[:, None] * np.abs(field) ** 2).ravel(), mesh.elements).astype(float)
         for factor, field in ((modulus / length, du), (length / modulus, dt))
     ])  # fmt: skip
+
+
+def measure_distortion(position: Complex, displacement: Complex) -> float:
+    """The largest displacement (k,) that is left of the nearest motion as a rigid body, small rotation included."""
+    if not len(position):
+        return 0.0
+    arm, left = position - position.mean(), displacement - displacement.mean()
+    turn = (np.conj(arm) * left).imag.sum() / max((np.abs(arm) ** 2).sum(), np.finfo(float).tiny)
+    return float(np.nan_to_num(np.abs(left - 1j * turn * arm)).max())

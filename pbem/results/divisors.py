@@ -36,6 +36,7 @@ class Divisors:
         self._slave = slave = beside.mesh.pairs.slave // (beside.mesh.order + 1)
         self._weight = beside.mesh.pairs.weight
         self._whole = as_they_are
+        self._corners = list_corner_elements(model, beside)
         self._modulus = np.array([region.material.plane_modulus for region in model.regions])[beside.fine.region]
         if as_they_are:
             self.weak = np.zeros(len(slave), dtype=bool)
@@ -44,7 +45,6 @@ class Divisors:
         self._at_end = find_rise(beside, 2.0, KINK) - 1
         by_element = choose_jump_divisors(model, beside, smooth)
         self._nodes, self._pairs = np.repeat(by_element, beside.mesh.order + 1), by_element[slave]
-        self._corners = list_corner_elements(model, beside)
         self.weak = find_weak_ends(model, beside)[slave]
         self._force_shares = list_force_shares(model, beside, smooth)
         self._factor_shares = list_factor_shares(model, beside, smooth)
@@ -76,6 +76,12 @@ class Divisors:
         size = np.bincount(self._slave, square, number) / np.where(length > 0, length, 1.0)
         corners = self._corners.choose_divisors(self._smooth, size)[self._slave]
         return np.minimum(ends.choose_divisors(self._smooth), corners)
+
+    def look_beyond(self, values: Real) -> Real:
+        """Values (e,) of the second solution's elements, in corners those of the next one on the curve, or zero."""
+        result, corners = values.copy(), self._corners
+        result[corners.element] = np.where(corners.beyond < 0, 0.0, values[corners.beyond])
+        return result
 
     def _square(self, energy: Real) -> Real:
         # A stiff region goes along with a soft one: the energy of that is none of its own.

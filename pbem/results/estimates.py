@@ -8,13 +8,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Bool, Complex, Real
+from pbem.arrays import Bool, Real
 from pbem.contact.laws import collect_laws
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.between import Violations
-from pbem.results.differences import bound_reactions, measure_energy, subtract_displacements, sum_reactions, sum_sizes
+from pbem.results.differences import (
+    bound_reactions,
+    measure_distortion,
+    measure_energy,
+    subtract_displacements,
+    sum_reactions,
+    sum_sizes,
+)
 from pbem.results.divisors import Divisors
 from pbem.results.rates import EndFinder, Ends
 from pbem.results.short_zones import bound_short_zones
@@ -94,8 +101,8 @@ class Comparison:
     """Compares the steps of a run with those of the second solution; on one rank.
 
     Where to refine, the largest over the steps so far, on each element of the run's mesh: energy (2, e) of the
-    difference of displacements and of tractions (stress times length squared); jumps (e,): estimated error of opening
-    and slip over the largest jump in the model.
+    difference of displacements and of tractions (stress times length squared); local (e,): estimated error of opening
+    and slip over the largest jump in the model, and of K where it comes from the length of the element at the tip.
     """
 
     def __init__(
@@ -112,7 +119,7 @@ class Comparison:
         laws = collect_laws(model, mesh)
         self._gap = laws.gap
         self._stuck_ends, self._stiff_tips = StuckEnds(model, mesh, laws), StiffTips(model, mesh, laws)
-        self.energy, self.jumps = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
+        self.energy, self.local = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
         self.scales = Scales()
         if beside is not None:
             self._others = list(sort_pairs(beside.mesh).items())
@@ -163,7 +170,7 @@ class Comparison:
         bounds = np.searchsorted(mesh.node_region, np.arange(len(moduli) + 1))
         for number, modulus in enumerate(moduli):
             own = slice(bounds[number], bounds[number + 1])
-            strained = max(strained, modulus * _measure_distortion(mesh.position[own], moved[own]))
+            strained = max(strained, modulus * measure_distortion(mesh.position[own], moved[own]))
         return float(strained / model.size)
 
     def compare(self, step: Step, second: Step | None) -> tuple[Estimates, Relative]:
@@ -180,7 +187,7 @@ class Comparison:
             estimates = self._subtract(step, second, self._beside, energy, least, jumps, ends)
             self.energy = np.maximum(self.energy, energy)
             located = self._locate_jumps(jumps, self._beside, least)
-            self.jumps = np.maximum(self.jumps, located)
+            self.local = np.maximum(self.local, located)
         return estimates, self._relate(estimates)
 
     def _know_nothing(self) -> Estimates:
@@ -233,8 +240,16 @@ class Comparison:
             largest = max(_largest(contact.opening[own] - self._gap[own]), _largest(contact.slip[own]))
             factor = _largest(factors[:, crack])
             least[crack] = LEAST_FACTOR_ERROR * jumps[number[name]] / largest * factor if largest > 0 else 0.0
-        least = np.fmax(least, self._rules.bound_short(*factors))
-        return np.fmax(least, self._stiff_tips.bound(step, factors))
+        at_tips = np.fmax(self._rules.bound_short(*factors), self._stiff_tips.bound(step, factors))
+        self._locate_factors(at_tips)
+        return np.fmax(least, at_tips)
+
+    def _locate_factors(self, least: Real) -> None:
+        """Tell the elements at tips what their lengths alone make of errors (2, cracks, 2) of factors."""
+        by_end, names = np.nan_to_num(least).max(axis=0) / (self.scales.factors or np.inf), list(self._model.crack_tips)
+        for crack, end in np.argwhere(by_end > 0):
+            element = self._mesh.pairs.slave[self._sorted[names[crack]][-end]] // (self._mesh.order + 1)
+            self.local[element] = max(self.local[element], by_end[crack, end])
 
     def _subtract_pairs(
         self, mine: ContactState, other: ContactState, beside: Beside, jumps: Real, ends: Ends
@@ -298,18 +313,20 @@ class Comparison:
         """Estimated error of the jumps on each element of the run (e,), over the largest jump so far; jumps: of
         `_divide_jumps`, least: of `_bound_jumps`.
 
-        The mean over each coarse element is left out: it comes from elsewhere.
+        The mean over each coarse element is left out, or that over the next one where it is in a corner: it comes from
+        elsewhere.
         """
         pairs, result = beside.mesh.pairs, np.zeros(self._mesh.elements)
         element = beside.carry.nearest[pairs.slave] // (self._mesh.order + 1)
-        own, of = np.unique(pairs.slave // (beside.mesh.order + 1), return_inverse=True)
+        own, number = pairs.slave // (beside.mesh.order + 1), beside.mesh.elements
         if self.scales.jumps > ROUNDING * self.scales.displacement:
             at_least = least.max(axis=1) / self.scales.jumps
             np.maximum.at(result, self._mesh.pairs.slave // (self._mesh.order + 1), at_least)
             for errors in jumps / self.scales.jumps:
-                mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
-                errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
-                np.maximum.at(result, element, np.abs(errors))
+                mean = np.bincount(own, errors, number) / np.maximum(np.bincount(own, minlength=number), 1)
+                for of_rest in (mean, self._divisors.look_beyond(mean)):
+                    left = errors - np.where(beside.mesh.tip > 0, 0.0, of_rest)[own]
+                    np.maximum.at(result, element, np.abs(left))
         return result
 
     def relate_violations(self, violations: Violations) -> Violations:
@@ -355,15 +372,6 @@ def to_rows(estimates: Estimates, relative: Relative, parts: Violations) -> dict
     rows = {name: value for name, value in vars(parts).items()}
     rows |= {name: np.asarray(value) for name, value in vars(estimates).items()}
     return rows | {f"relative_{name}": np.asarray(value) for name, value in vars(relative).items()}
-
-
-def _measure_distortion(position: Complex, displacement: Complex) -> float:
-    """The largest displacement (k,) that is left of the nearest motion as a rigid body, small rotation included."""
-    if not len(position):
-        return 0.0
-    arm, left = position - position.mean(), displacement - displacement.mean()
-    turn = (np.conj(arm) * left).imag.sum() / max((np.abs(arm) ** 2).sum(), np.finfo(float).tiny)
-    return _largest(np.abs(left - 1j * turn * arm))
 
 
 def _largest(values: NDArray[np.floating]) -> float:

@@ -15,7 +15,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import count_elements
-from pbem.results.accuracy import Decision, mark_contacts, mark_elements, refine_marked
+from pbem.results.accuracy import Decision, count_halvings, mark_contacts, mark_elements, refine_marked
 from pbem.results.divisors import Divisors
 from pbem.results.rates import (
     CORNER,
@@ -263,6 +263,30 @@ def test_far_from_the_goal_elements_in_corners_are_halved_twice(plate: Model, fa
     assert lengths["branch"][0] == pytest.approx((1 / 32) if far else (1 / 16))
     assert lengths["bottom"].min() == lengths["bottom"][0] and lengths["bottom"][-1] == pytest.approx(1 / 8)
     assert np.isclose(lengths["bottom"], 1 / 16).sum() >= 2
+
+
+def test_few_elements_in_corners_are_halved_as_often_as_their_errors_ask_for(plate: Model) -> None:
+    # Of jumps that fall with the root of the length: with 0.5, 1.5, 3 and 100 times what they may be.
+    deeper = {name: np.zeros(count_elements(curve), dtype=int) for name, curve in plate.curves.items()}
+    marked = {name: each.astype(bool) for name, each in deeper.items()}
+    deeper["bottom"][[0, 3]], marked["bottom"][[0, 3]] = 3, True
+    finer = refine_marked(plate, Decision(marked=marked, deeper=deeper))
+    lengths = 8 * np.diff(finer.curves["bottom"].legs[0].element_fractions())
+    assert lengths[0] == pytest.approx(1 / 16) and (lengths > 0.49).sum() == len(lengths) - 4
+    assert (lengths[1:] / lengths[:-1] < 2.001).all()
+    assert count_halvings(np.array([0.0, 0.5, 1.0, 1.3, 1.9, 2.5, 100.0])).tolist() == [0, 0, 0, 0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_less_of_the_energy_is_marked_where_jumps_in_single_places_are_off(plate: Model, alone: bool) -> None:
+    mesh = generate_mesh(plate)
+    energy, local = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
+    energy[:, [take_element(plate, mesh, name, k) for name in ("top", "left") for k in range(4)]] = 0.09
+    energy[:, take_element(plate, mesh, "bottom", 3)] = 1.0
+    local[take_element(plate, mesh, "branch", 0)] = 1.0
+    marked = mark_elements(plate, mesh, energy, local, 1e-2, 2e-2, alone)
+    assert np.flatnonzero(marked["branch"]).tolist() == [0] and marked["bottom"].sum() == 1
+    assert marked["left"].any() == (not alone)
 
 
 def test_where_all_is_marked_only_turns_of_cracks_are_halved_twice(plate: Model) -> None:

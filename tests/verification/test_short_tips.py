@@ -75,12 +75,3 @@ def test_accuracy_divides_these_elements(tmp_path: Path) -> None:
     exact = pbem.run(case, tmp_path / "exact.h5", set={**counts, "analysis": {"order": 3, "steps": 1}})
     (found, _), (true, _) = read_factors(results), read_factors(exact)
     assert abs(found - true) < 2e-3 * abs(true)
-
-
-def test_what_a_short_element_makes_of_k_is_told_where_to_refine(tmp_path: Path) -> None:
-    """Nothing is wrong there that a second solution sees: other elements were halved pass after pass."""
-    results = solve_star(tmp_path, 0.15, 50.0, 1, 2, accuracy=2e-3)
-    counts = {name: results.contact[name].slip.shape[1] // 3 for name in ("left", "right", "short", "long")}
-    assert counts["short"] >= 3 and sum(counts.values()) < 44
-    _, released = read_factors(solve_star(tmp_path, 0.15, 50.0, 12, 3, 24))
-    assert abs(read_factors(results)[1] / released - 1) < 4e-3

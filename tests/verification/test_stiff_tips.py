@@ -71,3 +71,16 @@ def test_open_faces_and_soft_joints_have_no_such_error(monkeypatch: pytest.Monke
             patch.setattr(stiff_tips, "FACTOR", (0.0,) * 4)
             expected = estimate(solved)
         np.testing.assert_array_equal(estimate(solved), expected)
+
+
+def test_the_elements_at_tips_are_told_to_be_refined() -> None:
+    # Two solutions agree there: elsewhere elements were halved pass after pass.
+    solved = make_crack(20.0, 6, 2)
+    estimator = make_estimator(solved.model, solved.mesh)
+    for step in solved.steps:
+        row = estimator.estimate(step)
+    local, pairs = estimator.comparison.local, solved.pairs("crack")
+    estimator.destroy()
+    at_tips = solved.mesh.pairs.slave[pairs[[0, -1]]] // 3
+    assert local[at_tips].min() > 0.9 * row["relative_factors"]
+    assert np.delete(local, at_tips).max() < 0.1 * local[at_tips].min()

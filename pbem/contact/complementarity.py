@@ -269,29 +269,57 @@ def solve_in_modes(pairs: PairProblem, modes: ModeState) -> Real | None:
 
     Rounding alone tells apart the solutions of equations that are all but singular: they have none either.
     """
-    is_open, slides = modes.mode == OPEN, modes.mode == SLIP
-    by_normal = -modes.sign * np.where(pairs.rough, pairs.friction, 0.0)
-    bound = modes.sign * np.where(pairs.rough, pairs.adhesion + pairs.friction * pairs.limit, 0.0)
-    climb = pairs.sign * np.where(slides & pairs.rough, pairs.climb, 0.0)
-    lifted = pairs.change[2] - climb[:, None] * pairs.change[3]
-    first = np.where(is_open[:, None], pairs.change[0], lifted)
-    on_seat = climb * pairs.constant[3] - pairs.constant[2]
-    given = np.where(is_open, pairs.limit - pairs.tension - pairs.constant[0], on_seat)
-    tangential = pairs.change[1] - np.where(slides, by_normal, 0.0)[:, None] * pairs.change[0]
-    friction = np.where(slides, bound + by_normal * pairs.constant[0], 0.0) - pairs.constant[1]
-    sticks = modes.mode == STICK
-    second = np.where(sticks[:, None], pairs.change[3], tangential)
-    matrix = np.concatenate([first, second])
-    right = np.concatenate([given, np.where(sticks, -pairs.constant[3], friction)])
+    found = factorise_modes(pairs, modes)
+    return None if found is None else found.d
+
+
+@dataclass(frozen=True)
+class Factors:
+    """LU factors (n, n) of the equations of all pairs in some modes, their row exchanges (n,), right side (n,),
+    solution d (n,), and the reciprocal of their condition."""
+
+    lu: Real
+    exchanges: Integer
+    right: Real
+    d: Real
+    condition: float
+
+
+def factorise_modes(pairs: PairProblem, modes: ModeState) -> Factors | None:
+    """The equations of some modes, factorised and solved; None as in solve_in_modes."""
+    matrix, right = pose_modes(pairs, modes, slice(None))
     if not len(right):
-        return right
+        return Factors(matrix, np.zeros(0, dtype=np.int32), right, right, 1.0)
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
-    # Rows are of two kinds, tractions and jumps; a column of nothing but rounding must stay small.
-    size = np.abs(matrix).max(axis=1)
-    if not (size > 0).all():
-        return None
     pairs.effort.take(2.0 / 3.0 * len(right) ** 3)
-    found = dgesvx(matrix / size[:, None], (right / size)[:, None], fact="N")
+    found = dgesvx(matrix, right[:, None], fact="N")
     d, condition = np.asarray(found[7])[:, 0], float(found[8])
-    return d if condition >= REGULAR and np.isfinite(d).all() else None
+    if not (condition >= REGULAR and np.isfinite(d).all()):
+        return None
+    return Factors(np.asarray(found[1]), np.asarray(found[2]), right, d, condition)
+
+
+def pose_modes(pairs: PairProblem, modes: ModeState, which: Integer | slice) -> tuple[Real, Real]:
+    """The equations of some pairs (k,) in their modes: rows (2 k, 2 s), those of the normal direction first, and right
+    sides (2 k,); each divided by the largest of its row, no numbers where all of it is zero."""
+    mode, sign = modes.mode[which], modes.sign[which]
+    constant, change = pairs.constant[:, which], pairs.change[:, which]
+    friction, adhesion = (np.where(pairs.rough, values, 0.0)[which] for values in (pairs.friction, pairs.adhesion))
+    is_open, slides, sticks = mode == OPEN, mode == SLIP, mode == STICK
+    by_normal = -sign * friction
+    bound = sign * (adhesion + friction * np.where(pairs.rough, pairs.limit, 0.0)[which])
+    climb = pairs.sign[which] * np.where(slides & pairs.rough[which], pairs.climb[which], 0.0)
+    lifted = change[2] - climb[:, None] * change[3]
+    first = np.where(is_open[:, None], change[0], lifted)
+    on_seat = climb * constant[3] - constant[2]
+    given = np.where(is_open, (pairs.limit - pairs.tension)[which] - constant[0], on_seat)
+    tangential = change[1] - np.where(slides, by_normal, 0.0)[:, None] * change[0]
+    rubs = np.where(slides, bound + by_normal * constant[0], 0.0) - constant[1]
+    second = np.where(sticks[:, None], change[3], tangential)
+    matrix = np.concatenate([first, second])
+    right = np.concatenate([given, np.where(sticks, -constant[3], rubs)])
+    # Rows are of two kinds, tractions and jumps; a column of nothing but rounding must stay small.
+    size = np.abs(matrix).max(axis=1, initial=0.0)
+    size = np.where(size > 0, size, np.nan)
+    return matrix / size[:, None], right / size

@@ -34,6 +34,7 @@ from pbem.contact.laws import (
     tensile_limit,
 )
 from pbem.contact.modes import Proposal, limit_changes
+from pbem.contact.one_by_one import OneByOne
 
 # The most pairs that are pivoted; Newton's steps among them cost a hundredth of it.
 MOST_PIVOTED = 300
@@ -118,16 +119,22 @@ def step_subset(
 
     Along a slender wedge the end of contact moves by an element or two in a step, however many there are.
     """
+    solver = OneByOne(problem)
     for share in shares:
         if share == 1.0 and len(modes.mode) > most:  # it would not come to the end
             break
         seen: set[bytes] = set()
         while len(seen) < most and not problem.effort.is_spent and modes.fingerprint() not in seen:
             seen.add(modes.fingerprint())
-            d = solve_in_modes(problem, modes) if holds(modes) else None
+            d = solver.solve(modes) if holds(modes) else None
             if d is None:
                 return None
             proposal = judge(modes, response.evaluate(d))
+            if not proposal.changed.any() and solver.updated:  # what is settled is said of factors of its own
+                d = solver.solve(modes, anew=True)
+                if d is None:
+                    return None
+                proposal = judge(modes, response.evaluate(d))
             if not proposal.changed.any():
                 return modes
             modes = limit_changes(modes, proposal, share)

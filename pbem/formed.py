@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
-from pbem.arrays import Integer
+from pbem.arrays import Bool, Integer
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -65,7 +65,7 @@ class FormedArray(NDArrayOperatorsMixin):
             return self._take_places(np.asarray(key, dtype=np.int64))
         if isinstance(key, np.ndarray) and key.dtype == bool and key.shape == self.shape:
             return self._form(np.flatnonzero(key))
-        if isinstance(key, int | np.integer):
+        if isinstance(key, int | np.integer) and not isinstance(key, bool):
             return self._take_places(np.array([operator.index(key)]))[0]
         return np.asarray(self)[key]
 
@@ -74,13 +74,18 @@ class FormedArray(NDArrayOperatorsMixin):
         return whole if dtype is None else whole.astype(dtype, copy=False)
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **named: Any) -> Any:
+        written = inputs[:1] if method == "at" else named.get("out", ())
+        if any(isinstance(each, FormedArray) for each in written):
+            raise TypeError("a FormedArray cannot be written to")
         return getattr(ufunc, method)(*(
             np.asarray(each) if isinstance(each, FormedArray) else each for each in inputs), **named)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):  # of copies and pickles, which have nothing at first
             raise AttributeError(name)
-        return getattr(np.asarray(self), name)
+        whole = np.asarray(self)
+        whole.flags.writeable = False  # what is written to it would be lost
+        return getattr(whole, name)
 
     def __repr__(self) -> str:
         return f"FormedArray({self._count} values, {self._dtype})"
@@ -91,7 +96,7 @@ class FormedArray(NDArrayOperatorsMixin):
             raise IndexError(f"places from {places.min()} to {places.max()} in an array of {self._count}")
         if places.size and places.min() < 0:
             places = np.where(places < 0, places + self._count, places)
-        return self._form(places.ravel()).reshape(places.shape)
+        return self._form(places.ravel()).reshape(places.shape)[()]
 
     def _form_parts(self) -> NDArray[Any]:
         whole = np.empty(self._count, dtype=self._dtype)
@@ -106,13 +111,38 @@ def is_large(count: int) -> bool:
     return count >= LARGE
 
 
-def form_values(values: NDArray[Scalar], form: Callable[[Integer], NDArray[Any]]) -> NDArray[Scalar]:
+@dataclass(frozen=True)
+class _Except:
+    """Values (k,) that are stored, of places (k,) that rise; `others` forms those of all others."""
+
+    place: Integer
+    value: NDArray[Any]
+    others: Callable[[Integer], NDArray[Any]]
+
+    def form(self, places: Integer) -> NDArray[Any]:
+        """Values (p,) at places (p,)."""
+        found = self.others(places)
+        at = np.minimum(np.searchsorted(self.place, places), len(self.place) - 1)
+        stored = self.place[at] == places
+        found[stored] = self.value[at[stored]]
+        return found
+
+
+def form_values(
+    values: NDArray[Scalar], form: Callable[[Integer], NDArray[Any]], stored: Bool | None = None
+) -> NDArray[Scalar]:
     """Large arrays (n,) whose values are formed when they are asked for; as they are if any would be another one.
 
-    form: see FormedArray.
+    form: see FormedArray; it must form the same value of a place whatever other places it is asked for with it. Where
+    it does not (stored, (n,)), the values are stored.
     """
     if not (is_large(len(values)) and isinstance(values, np.ndarray) and any(values.strides)):
         return values  # uniform ones take no room as they are
+    if stored is not None and stored.any():
+        place = np.flatnonzero(stored)
+        if len(place) > WORTH * len(values):
+            return values
+        form = _Except(place, values[place], form).form
     for begin in range(0, len(values), FORMED):
         part = np.arange(begin, min(begin + FORMED, len(values)))
         found, there = np.asarray(form(part)), values[part[0] : part[-1] + 1]

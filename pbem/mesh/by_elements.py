@@ -2,6 +2,10 @@
 
 Every rank has the mesh of the whole model. Of cracks alone the places, normals and weights of nodes, and what pairs
 have, are five sixths of it; ends of elements remain.
+
+What nodes of arcs have is stored as it is: NumPy rounds products of complex numbers, and the functions of angles, in
+more than one way, by how many there are and where they begin. Ranks that ask for a node with others would have another
+last bit of it. Straight elements need sums, quotients, and products with real numbers alone.
 """
 
 from __future__ import annotations
@@ -85,9 +89,12 @@ def form_by_elements(mesh: Mesh) -> Mesh:
     if not is_large(mesh.nodes):
         return mesh
     nodes = _ElementNodes(mesh.geometry, mesh.crack, mesh.local, mesh.crack_local)
-    position, normal = form_values(mesh.position, nodes.place), form_values(mesh.normal, nodes.find_normals)
-    weight = form_values(mesh.weight, nodes.weigh)
-    pairs = _form_pairs(mesh, nodes, {id(mesh.position): position, id(mesh.normal): normal, id(mesh.weight): weight})
+    curved = np.repeat(mesh.sweep != 0, mesh.order + 1)
+    position, normal = (form_values(values, form, curved) for values, form in (
+        (mesh.position, nodes.place), (mesh.normal, nodes.find_normals)))
+    weight = form_values(mesh.weight, nodes.weigh, curved)
+    formed = {id(mesh.position): position, id(mesh.normal): normal, id(mesh.weight): weight}
+    pairs = _form_pairs(mesh, nodes, curved, formed)
     links = Links(**{name: form_runs(values) for name, values in vars(mesh.links).items()})
     return replace(
         mesh, position=position, normal=normal, weight=weight, pairs=pairs, links=links,
@@ -96,22 +103,21 @@ def form_by_elements(mesh: Mesh) -> Mesh:
     )
 
 
-def _form_pairs(mesh: Mesh, nodes: _ElementNodes, formed: dict[int, Any]) -> Pairs:
-    """formed: what nodes have, by the numbers of the arrays that pairs may have in common with them."""
+def _form_pairs(mesh: Mesh, nodes: _ElementNodes, curved: Bool, formed: dict[int, Any]) -> Pairs:
+    """curved (n,): nodes of arcs. formed: what nodes have, by the numbers of the arrays that pairs may have in common
+    with them."""
     pairs, found = mesh.pairs, dict(formed)
 
-    def form(name: str, other: Any) -> Any:
+    def form(name: str, *how: Any) -> Any:
         values = getattr(pairs, name)
         if id(values) not in found:  # what is the same array stays the same
-            found[id(values)] = form_runs(values) if other is None else form_values(values, other)
+            found[id(values)] = form_values(values, *how) if how else form_runs(values)
         return found[id(values)]
 
-    first = form("first", None)
-    by_nodes = {name: _AtNodes(found[id(getattr(mesh, name))], first).take for name in ("position", "normal", "weight")}
-    along = _AlongCurves(nodes, _measure_before(mesh), first).measure
-    return Pairs(**{
-        name: form(name, {**by_nodes, "arc_length": along}.get(name)) for name in vars(pairs)
-    })
+    first = form("first")
+    how = {name: (_AtNodes(found[id(getattr(mesh, name))], first).take,) for name in ("position", "normal", "weight")}
+    how["arc_length"] = _AlongCurves(nodes, _measure_before(mesh), first).measure, curved[first]
+    return Pairs(**{name: form(name, *how.get(name, ())) for name in vars(pairs)})
 
 
 def _measure_before(mesh: Mesh) -> Real:

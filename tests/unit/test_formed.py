@@ -6,6 +6,7 @@ import copy
 import pickle
 from collections.abc import Callable
 from dataclasses import fields
+from operator import iadd, setitem
 from typing import Any
 
 import numpy as np
@@ -66,8 +67,21 @@ def test_places_that_there_are_none_of_are_refused() -> None:
     for key in (40, -41, np.array([3, 40]), np.array([-41])):
         with pytest.raises(IndexError):
             found[key]
-    with pytest.raises(TypeError):
-        found[3] = 1
+
+
+def test_nothing_is_written_to_what_is_not_stored() -> None:
+    """It would be lost without a word."""
+    found: Any = form_runs(np.arange(40))
+    uses: dict[str, Callable[[], Any]] = {
+        "to a place": lambda: setitem(found, 3, 1), "in place": lambda: iadd(found, 1),
+        "out": lambda: np.add(found, 1, out=found), "at": lambda: np.add.at(found, [0], 1),
+        "fill": lambda: found.fill(0), "sort": lambda: found.sort(), "copyto": lambda: np.copyto(found, 1),
+    }  # fmt: skip
+    for name, use in uses.items():
+        with pytest.raises((TypeError, ValueError)):
+            pytest.fail(f"{name}: {use()}")
+    assert (np.asarray(found) == np.arange(40)).all()
+    assert found.copy().flags.writeable
 
 
 def test_values_that_would_be_others_stay_as_they_are() -> None:
@@ -122,6 +136,33 @@ def test_meshes_and_laws_are_the_same(name: str, monkeypatch: pytest.MonkeyPatch
                 assert np.asarray(getattr(one, each.name)).tobytes() == values.tobytes(), each.name
     assert digest(start_memory(laws)) == digest(start_memory(expected))
     assert digest(mesh) == digest(plain)
+
+
+@pytest.mark.parametrize("name", [*TEXTS])
+def test_values_do_not_depend_on_what_is_formed_with_them(name: str) -> None:
+    """To the last bit: ranks that ask for a node alone, or with others, take the same place for it."""
+    mesh = generate_mesh(build(TEXTS[name].replace("elements = 7", "elements = 70")))
+    formed_alone = 0
+    for item in (mesh, mesh.pairs):
+        for each in fields(item):
+            found = getattr(item, each.name)
+            if isinstance(found, FormedArray):
+                formed_alone += 1
+                for some in range(1, 8):
+                    parts = [found[begin : begin + some] for begin in range(0, len(found), some)]
+                    assert np.concatenate(parts).tobytes() == np.asarray(found).tobytes(), (each.name, some)
+                apart = np.arange(len(found) // 3 * 3).reshape(-1, 3)[::-1, ::2]
+                assert found[apart].tobytes() == np.asarray(found)[apart].tobytes(), each.name
+    assert formed_alone > 3
+
+
+def test_of_arcs_values_are_stored_and_formed_of_the_rest() -> None:
+    straight = CURVED.replace("elements = [5, 6]", "elements = [50, 60]")
+    mesh = generate_mesh(build(straight))
+    for found in (mesh.position, mesh.normal, mesh.weight, mesh.pairs.arc_length):
+        assert isinstance(found, FormedArray)
+        stored = [each.size for each in list_arrays(found, set()) if each.size == 21]
+        assert len(stored) >= 2  # places and values of three nodes on seven arcs
 
 
 def test_of_cracks_little_more_than_the_ends_of_elements_is_stored() -> None:

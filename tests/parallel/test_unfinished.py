@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pbem
-from pbem import parallel
+from pbem import formed, parallel
 from pbem.cli import main
 from pbem.errors import StopError
 from pbem.results.reader import Results, open_results
@@ -107,8 +107,10 @@ class Stopping(SilentReporter):
 
 @pytest.mark.usefixtures("without_errors")
 @pytest.mark.parametrize("operator", ["dense", "hierarchical"])
-def test_no_iteration_is_made_twice(operator: str, tmp_path: Path) -> None:
+def test_no_iteration_is_made_twice(operator: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The resumed search is where it was: the iterations in the file are those of a run left alone, one by one."""
+    if operator == "hierarchical":  # as in large models
+        monkeypatch.setattr(formed, "LARGE", 1)
     make_case(tmp_path)
     expect_no_iteration_twice(tmp_path, operator)
 

@@ -21,6 +21,7 @@ from pbem.contact.modes import Linearisation, begin_slip
 from pbem.contact.separating import begin_jump
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
+from pbem.formed import FormedArray
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.smooth_search import SmoothCourse, Width
@@ -130,6 +131,8 @@ def to_plain(value: Any) -> Any:
         return value.item()
     if value is None or isinstance(value, bool | int | float | str | bytes | np.ndarray):
         return value
+    if isinstance(value, FormedArray):
+        return np.asarray(value)
     if isinstance(value, Mapping):
         return {str(key): to_plain(each) for key, each in value.items()}
     if isinstance(value, tuple | set | frozenset):

@@ -103,7 +103,8 @@ class CutParts:
     def find_around(self, body: int) -> tuple[Integer, Complex]:
         """The cracks' pairs (k,) around a part, and the normals into it (k,): along which it moves to open them."""
         pairs = self.mesh.pairs
-        own = np.flatnonzero(pairs.crack & ((self.first == body) != (self.second == body)))
+        own = np.flatnonzero((self.first == body) != (self.second == body))
+        own = own[pairs.crack[own]]
         # The normal is outward of the first face, and an opening is the motion of the second one along it.
         return own, np.where(self.second[own] == body, 1.0, -1.0) * pairs.normal[own]
 

@@ -231,9 +231,10 @@ def open_unequal_neighbours(mesh: Mesh, laws: PairLaws, modes: ModeState) -> Mod
     not equally far apart; the same modes where there are none."""
     pairs, mode, gap = mesh.pairs, modes.mode.copy(), laws.gap
     closed = np.flatnonzero((mode != OPEN) & ~pairs.crack)
-    count = np.bincount(pairs.interface[closed], minlength=len(mesh.interface_names))
+    interface = np.asarray(pairs.interface)  # formed once, not for each number
+    count = np.bincount(interface[closed], minlength=len(mesh.interface_names))
     for number in np.flatnonzero(count == 2):
-        along = np.flatnonzero(pairs.interface == number)
+        along = np.flatnonzero(interface == number)
         along = along[np.argsort(pairs.arc_length[along], kind="stable")]
         at = np.flatnonzero(mode[along] != OPEN)
         first, second = along[at]

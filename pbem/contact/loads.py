@@ -207,6 +207,7 @@ def _blend_all(values: Sequence[tuple[Value, Value]], owner: Integer, places: Pl
     plain = [[0.0 if isinstance(each, Varying) else each for each in pair] for pair in values]
     numbers = np.array(plain, dtype=float).reshape(-1, 2)
     given = numbers[:, 0] + moment.factor * (numbers[:, 1] - numbers[:, 0])
+    owner = np.asarray(owner)  # formed once, not for each owner
     result = np.asarray(given[owner], dtype=float)
     for number, (before, after) in enumerate(values):
         if isinstance(before, Varying) or isinstance(after, Varying):

@@ -115,7 +115,9 @@ def _form_pairs(mesh: Mesh, nodes: _ElementNodes, curved: Bool, formed: dict[int
         return found[id(values)]
 
     first = form("first")
-    how = {name: (_AtNodes(found[id(getattr(mesh, name))], first).take,) for name in ("position", "normal", "weight")}
+    how: dict[str, tuple[Any, ...]] = {
+        name: (_AtNodes(found[id(getattr(mesh, name))], first).take,) for name in ("position", "normal", "weight")
+    }
     how["arc_length"] = _AlongCurves(nodes, _measure_before(mesh), first).measure, curved[first]
     return Pairs(**{name: form(name, *how.get(name, ())) for name in vars(pairs)})
 

@@ -7,14 +7,15 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.mesh import Mesh, second_face_nodes
+from pbem.mesh.numbering import list_nodes
 
 
 def locate_nodes(mesh: Mesh, elements: Integer | None = None) -> Real:
     """The coordinates s (e, p + 1) of all nodes on their elements, or of the nodes of some elements (e,)."""
-    position = mesh.position.reshape(mesh.elements, -1)
     if elements is None:
-        return mesh.geometry.preimage(position).real
-    return mesh.geometry.select(elements).preimage(position[elements]).real
+        return mesh.geometry.preimage(mesh.position.reshape(mesh.elements, -1)).real
+    position = mesh.position[list_nodes(mesh, elements)].reshape(len(elements), -1)
+    return mesh.geometry.select(elements).preimage(position).real
 
 
 def interpolate(local: Real, s: Real) -> Real:

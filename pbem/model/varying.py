@@ -117,6 +117,7 @@ def blend(before: Value, after: Value, places: Places, moment: Moment) -> Real:
 def spread_values(values: Sequence[Value], owner: Integer, places: Places) -> Real:
     """The values of owners, such as interfaces, at places (k,) that each have one."""
     numbers = np.array([0.0 if isinstance(value, Varying) else value for value in values] or [0.0], dtype=float)
+    owner = np.asarray(owner)  # formed once, not for each value
     result = np.asarray(numbers[owner])
     for value in {value for value in values if isinstance(value, Varying)}:
         own = np.flatnonzero(np.array([each == value for each in values])[owner])

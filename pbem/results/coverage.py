@@ -13,13 +13,13 @@ from pbem.model.model import Contact, Model
 def describe_sparse_contacts(model: Model, mesh: Mesh, mode: Modes) -> tuple[str, ...]:
     """A sentence for every contact, and interface with a gap, that is closed on fewer than five elements; mode (m,)."""
     pairs = mesh.pairs
-    element = pairs.slave // (mesh.order + 1)
+    element, interface = pairs.slave // (mesh.order + 1), np.asarray(pairs.interface)
     notes = []
     for number, name in enumerate(mesh.interface_names):
         joint = find_joint(model, name)
         if not isinstance(joint, Contact) and not joint.law.gap:
             continue
-        own = pairs.interface == number
+        own = interface == number
         facing, closed = (len(np.unique(element[where])) for where in (own, own & (mode != OPEN)))
         if 0 < closed < FEWEST <= facing:
             notes.append(

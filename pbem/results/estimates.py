@@ -140,7 +140,7 @@ class Comparison:
         """The largest values of one step."""
         # Of what a stage has removed: the gap that was there is no jump.
         contact = self._absence.blank(replace(step, interior=None)).contact
-        mesh, weight = self._mesh, self._mesh.pairs.weight
+        mesh, weight = self._mesh, np.asarray(self._mesh.pairs.weight)
         factors = self._rules.evaluate_factors(contact)
         square = weight * (contact.traction_n**2 + contact.traction_s**2)
         tractions = max((float(np.sqrt(square[p].sum() / weight[p].sum())) for p in self._interfaces), default=0.0)
@@ -257,7 +257,7 @@ class Comparison:
         """Per interface (i,): estimated errors, of opening and slip the largest, of the tractions the mean ones."""
         opening, slip = jumps
         normal, tangential = self._subtract_tractions(mine, other, beside, ends)
-        weight = beside.mesh.pairs.weight
+        weight = np.asarray(beside.mesh.pairs.weight)
         borne = weight * (other.traction_n**2 + other.traction_s**2)
         of = dict(self._others)
         found = []

@@ -114,10 +114,10 @@ class TipRules:
         pair of the tip's element is open or has an elastic joint, KI is exactly zero.
         """
         KI, KII = self._start(), self._start()
-        per_element = self.mesh.order + 1
+        per_element, normal = self.mesh.order + 1, np.asarray(self.mesh.pairs.normal)
         for group in self.groups:
             modulus = group.material.plane_modulus
-            jumps = self._jumps(contact, group)[:, : group.forms.intensity.shape[1]]
+            jumps = self._jumps(contact, group, normal)[:, : group.forms.intensity.shape[1]]
             factors = (modulus / np.sqrt(group.length))[:, None] * (jumps @ group.forms.intensity.T)
             first = group.pair[:, :per_element]
             opens = (contact.opening[first] != self.gap[first]).any(axis=1)
@@ -129,23 +129,23 @@ class TipRules:
     def evaluate_release(self, contact: ContactState) -> Real:
         """J (cracks, 2), stress times length: the energy released per length of growth straight ahead; NaN on
         interfaces, whose J needs all of the boundary."""
-        J = self._start()
+        J, normal = self._start(), np.asarray(self.mesh.pairs.normal)
         for group in self.groups:
-            jumps = self._jumps(contact, group)[:, : len(group.forms.release)]
+            jumps = self._jumps(contact, group, normal)[:, : len(group.forms.release)]
             form = ((jumps @ group.forms.release) * jumps).sum(axis=1)
             J[group.tip] = group.material.plane_modulus / group.length * form
         return J.reshape(-1, 2) + 0.0
 
     def evaluate_parallel(self, step: Step) -> Real:
         """T (cracks, 2), stress: what stays finite at the tip of the normal stress along the crack, loads included."""
-        T = self._start()
+        T, normal = self._start(), np.asarray(self.mesh.pairs.normal)
         first, opposite = split_faces(self.mesh, step.displacement)
         mean = 0.5 * (first + opposite)[self.mesh.pairs.first]
         particulars = evaluate_particular_solutions(self.model, step.stage, step.factor)
         for group in self.groups:
             forms, material = group.forms, group.material
             modulus = material.plane_modulus
-            jumps = self._jumps(step.contact, group)[:, : len(forms.parallel)]
+            jumps = self._jumps(step.contact, group, normal)[:, : len(forms.parallel)]
             near = group.pair[:, : len(forms.of_normal)]
             moved = mean[near] * np.conj(group.direction)[:, None]
             # A motion as a whole has no part in it.
@@ -180,11 +180,12 @@ class TipRules:
     def _start(self) -> Real:
         return np.where(self.is_tip, 0.0, np.nan)
 
-    def _jumps(self, contact: ContactState, group: _Alike) -> Real:
-        """Jumps (k, 2 m (p + 1)) as TipForms takes them, but for the length."""
+    def _jumps(self, contact: ContactState, group: _Alike, normal: Complex) -> Real:
+        """Jumps (k, 2 m (p + 1)) as TipForms takes them, but for the length; normal: of all pairs, which whoever goes
+        through the groups, of a few tips each, forms once."""
         # Of the group's pairs alone: all of the model's once for each group would be the most of a step of a network.
         opening, slip = contact.opening[group.pair] - self.gap[group.pair], contact.slip[group.pair]
-        jump = -(opening + 1j * slip) * self.mesh.pairs.normal[group.pair]
+        jump = -(opening + 1j * slip) * normal[group.pair]
         turned = jump * group.sense * np.conj(group.direction)[:, None]
         return np.stack([turned.real, turned.imag], axis=2).reshape(len(turned), -1)
 

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pbem.arrays import Bool, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.combinations import Combination, make_combination
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.mesh import Mesh
@@ -98,11 +98,12 @@ class SmallGroups:
         asked = _Asked(self._mesh, groups)
         formed = self._place_free(asked, near)
         scale = -np.repeat(self._local.scale(asked.node), 2)[:, None]
+        places = self._mesh.position[asked.node], self._mesh.normal[asked.node]  # at once: a part has few of them
         for part, on in self._list_parts(asked, near):
-            self._add_products(formed[part.group], asked, part, on, scale)
-        places = asked.places[2 * asked.row] // 2
+            self._add_products(formed[part.group], asked, part, places, on, scale)
+        rows = asked.places[2 * asked.row] // 2
         own = [slice(*asked.first_row[k : k + 2]) for k in range(len(groups))]
-        return [asked.take_kept(k, turn_rows(less, places[own[k]], formed[k])) for k in range(len(groups))]
+        return [asked.take_kept(k, turn_rows(less, rows[own[k]], formed[k])) for k in range(len(groups))]
 
     def _place_free(self, asked: _Asked, near: NearMap) -> list[Real]:
         """Of each group a matrix of its rows and columns, with the free terms in it."""
@@ -175,8 +176,11 @@ class SmallGroups:
             bounded[parts] = np.logical_or.reduceat(chosen.family == 0, ends[:-1])
         return sources, bounded
 
-    def _add_products(self, formed: Real, asked: _Asked, part: _Part, on: Integer, scale: Real) -> None:
-        """Add to the rows of a group what the elements of a region do, as the constraint map combines it."""
+    def _add_products(
+        self, formed: Real, asked: _Asked, part: _Part, places: tuple[Complex, Complex], on: Integer, scale: Real
+    ) -> None:
+        """Add to the rows of a group what the elements of a region do, as the constraint map combines it; places:
+        positions and normals (n,) of all nodes that are asked for."""
         mesh, rows = self._mesh, slice(*part.rows)
         node = asked.node[rows]
         is_traction = mesh.traction_equation[node]
@@ -184,9 +188,9 @@ class SmallGroups:
             at = np.flatnonzero(is_traction == traction)
             if not len(at):
                 continue
-            own, normal = node[at], mesh.normal[node[at]] if traction else None
+            position, normal = (each[rows][at] for each in places)
             first, second = evaluate_rows(
-                part.sources, mesh.position[own], on[at], normal, part.bounded, mesh.take_local(own)
+                part.sources, position, on[at], normal if traction else None, part.bounded, mesh.take_local(node[at])
             )
             values = first if second is None else np.concatenate([first, second], axis=1)
             at = number_components(at)

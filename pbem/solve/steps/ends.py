@@ -101,12 +101,12 @@ def end_by_sliding(
     """The error where friction is used up; traction_s (m,): of the pairs at the fraction that was reached."""
     held = find_held(problem, memory, former, stage, reached, slides)
     assert held is not None
-    pairs, names = problem.mesh.pairs, []
-    for number, name in enumerate(problem.mesh.interface_names):
-        own = (pairs.interface == number) & ~pairs.crack
-        most = float(pairs.weight[own] @ held.bound[own])
-        if most > 0 and pairs.weight[own] @ np.abs(traction_s[own]) >= USED_UP * most:
-            names.append(repr(name))
+    pairs = problem.mesh.pairs
+    facing = np.flatnonzero(~pairs.crack)
+    weight, interface = pairs.weight[facing], pairs.interface[facing]
+    count = len(problem.mesh.interface_names)
+    most, used = (np.bincount(interface, weight * each[facing], count) for each in (held.bound, np.abs(traction_s)))
+    names = [repr(problem.mesh.interface_names[k]) for k in np.flatnonzero((most > 0) & (used >= USED_UP * most))]
     where = f" on {', '.join(names)}" if names else ""
     name = problem.model.stages[stage].name
     return ConvergenceError(

@@ -230,7 +230,7 @@ def _split(values: Complex) -> Real:
 def _move_pairs(problem: Problem, motions: tuple[RigidBodyMode, ...], parts: Real) -> tuple[Real, Real]:
     """What the motions add to opening and slip of the pairs (m,): of the second region against the first."""
     pairs, jump = problem.mesh.pairs, np.zeros(problem.mesh.pairs.count, dtype=complex)
-    model = problem.model
+    model, interface = problem.model, np.asarray(pairs.interface)
     bounded = {side.curve: region.name for region in model.regions for loop in region.loops for side in loop.sides}
     for number, name in enumerate(problem.mesh.interface_names):
         if name in model.contacts:
@@ -239,7 +239,7 @@ def _move_pairs(problem: Problem, motions: tuple[RigidBodyMode, ...], parts: Rea
             first, second = model.interfaces[name].first, str(model.interfaces[name].second)
         else:
             continue
-        own = pairs.interface == number
+        own = np.flatnonzero(interface == number)
         for part, motion in zip(parts, motions, strict=True):
             (a, v), (b, w) = (motion.velocities.get(region, (0j, 0.0)) for region in (first, second))
             away = b - a + 1j * (w - v) * pairs.position[own]

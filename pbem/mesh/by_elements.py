@@ -89,7 +89,7 @@ def form_by_elements(mesh: Mesh) -> Mesh:
     if not is_large(mesh.nodes):
         return mesh
     nodes = _ElementNodes(mesh.geometry, mesh.crack, mesh.local, mesh.crack_local)
-    curved = np.repeat(mesh.sweep != 0, mesh.order + 1)
+    curved = np.repeat(mesh.geometry.turns != 0, mesh.order + 1)
     position, normal = (form_values(values, form, curved) for values, form in (
         (mesh.position, nodes.place), (mesh.normal, nodes.find_normals)))
     weight = form_values(mesh.weight, nodes.weigh, curved)

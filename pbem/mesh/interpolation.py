@@ -14,7 +14,7 @@ def locate_nodes(mesh: Mesh, elements: Integer | None = None) -> Real:
     """The coordinates s (e, p + 1) of all nodes on their elements, or of the nodes of some elements (e,)."""
     if elements is None:
         return mesh.geometry.preimage(mesh.position.reshape(mesh.elements, -1)).real
-    position = mesh.position[list_nodes(mesh, elements)].reshape(len(elements), -1)
+    position = mesh.position[list_nodes(mesh, elements)].reshape(len(elements), mesh.order + 1)
     return mesh.geometry.select(elements).preimage(position).real
 
 

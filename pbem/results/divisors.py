@@ -78,7 +78,7 @@ class Divisors:
         return np.minimum(ends.choose_divisors(self._smooth), corners)
 
     def look_beyond(self, values: Real) -> Real:
-        """Values (e,) of the second solution's elements, in corners those of the next one on the curve, or zero."""
+        """Values (e,) of the second solution's elements, in corners those of the next one away from it, or zero."""
         result, corners = values.copy(), self._corners
         result[corners.element] = np.where(corners.beyond < 0, 0.0, values[corners.beyond])
         return result

@@ -116,15 +116,16 @@ def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
     for name, own in list_curve_elements(beside.model, coarse):
         at_start, at_end = model.crack_tips.get(name, (False, False))
         result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(at_tip, smooth)
-        for element, ratio, power in at_corner.get(name, ()):
-            result[own[element]] = min(result[own[element]], CORNER, find_rise(beside, ratio, power) - 1)
+        for end in at_corner.get(name, ()):
+            at = own[end.element]
+            result[at] = min(result[at], CORNER, find_rise(beside, end.ratio, end.power) - 1)
     return result
 
 
 @dataclass(frozen=True)
 class CornerElements:
-    """Elements (k,) of the second solution in corners, the elements next to them on their curves (-1: none), and what
-    differences of tractions that are singular there are divided by."""
+    """Elements (k,) of the second solution in corners, the elements next to them on their curves, away from the corner
+    (-1: none), and what differences of tractions that are singular there are divided by."""
 
     element: Integer
     beyond: Integer
@@ -145,9 +146,12 @@ def list_corner_elements(model: Model, beside: Beside) -> CornerElements:
     """The elements in corners of the mesh beside that of a model (theory, 126)."""
     at_corner, rows = _list_merged_ends(model, beside.model), []
     for name, own in list_curve_elements(beside.model, beside.mesh):
-        for number, ratio, _ in at_corner.get(name, ()):
-            along = [own[k] for k in (number + 1, number - 1) if 0 <= k < len(own)]
-            rows.append((own[number], along[0] if along else -1, find_rise(beside, ratio, TRACTION_RATE) - 1))
+        for end in at_corner.get(name, ()):
+            # On the other side of a corner between two legs tractions are singular as well.
+            beyond = end.element + (1 if end.at_start else -1)
+            inside = 0 <= beyond < len(own)
+            divisor = find_rise(beside, end.ratio, TRACTION_RATE) - 1
+            rows.append((own[end.element], own[beyond] if inside else -1, divisor))
     table = np.array(rows, dtype=float).reshape(-1, 3)
     return CornerElements(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2])
 
@@ -157,7 +161,7 @@ def find_weak_ends(model: Model, beside: Beside) -> Bool:
     vanish at the end follow a power below WEAK; model: of the run."""
     weak, at_corner = np.zeros(beside.mesh.elements, dtype=bool), _list_merged_ends(model, beside.model)
     for name, own in list_curve_elements(beside.model, beside.mesh):
-        weak[own[[element for element, _, power in at_corner.get(name, ()) if power < WEAK]]] = True
+        weak[own[[end.element for end in at_corner.get(name, ()) if end.power < WEAK]]] = True
     return weak
 
 
@@ -212,11 +216,11 @@ def _list_shares(
     at_corner = _list_merged_ends(model, beside.model)
     by = np.full(beside.fine.elements, 1 / smooth)
     for name, own in list_curve_elements(beside.model, beside.mesh):
-        for element, ratio, power in at_corner.get(name, ()):
-            rate = find_rate(name, power)
+        for end in at_corner.get(name, ()):
+            rate = find_rate(name, end.power)
             if rate is not None:
-                at = fine[own[element]]
-                by[at] = np.maximum(by[at], 1 / (find_rise(beside, ratio, rate) - 1))
+                at = fine[own[end.element]]
+                by[at] = np.maximum(by[at], 1 / (find_rise(beside, end.ratio, rate) - 1))
     return by
 
 
@@ -228,15 +232,27 @@ def find_rise(beside: Beside, ratio: float, power: float) -> float:
     return float(ratio**power if beside.kind == "merged" else nodes ** (2 * power))
 
 
-def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int, float, float]]]:
-    """Of each curve with corners, the coarser model's elements there (along all legs), how many times as long they are
-    as the model's, and the power of the distance that jumps follow there.
-
-    Where nothing was merged nothing is known: as if they were twice as long.
+@dataclass(frozen=True)
+class _MergedEnd:
+    """An end of a leg of the coarser model at a corner, its start or its other end: its element there (along all legs
+    of the curve), how many times as long that is as the model's, and the power of the distance that jumps follow there.
     """
-    found: dict[str, list[tuple[int, float, float]]] = {}
+
+    element: int
+    ratio: float
+    power: float
+    at_start: bool
+
+
+def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[_MergedEnd]]:
+    """Those of each curve with corners.
+
+    Where nothing was merged nothing is known: as if elements were twice as long.
+    """
+    found: dict[str, list[_MergedEnd]] = {}
     for mine, other in zip(list_corner_ends(model), list_corner_ends(coarser), strict=True):
-        found.setdefault(other.curve, []).append((other.element, max(other.length / mine.length, 2.0), other.power))
+        ratio = max(other.length / mine.length, 2.0)
+        found.setdefault(other.curve, []).append(_MergedEnd(other.element, ratio, other.power, other.at_start))
     return found
 
 

@@ -132,6 +132,27 @@ def test_differences_at_a_corner_say_more_where_its_elements_were_much_shorter(p
     np.testing.assert_allclose(corners.choose_divisors(SMOOTH, size), expected)
 
 
+def test_next_to_an_element_in_a_corner_is_one_of_its_own_leg(plate: Model) -> None:
+    # Of a turning curve the one beyond the corner was taken, where tractions are singular as well: their errors on a
+    # square inclusion of one curve were told 0.7 times as large as with a curve to each side.
+    text = PLATE.replace("[regions.plate]", """
+square = { points = [[1, 1], [3, 1], [3, 3], [1, 3], [1, 1]], elements = 8 }
+[regions.square]
+material = "rock"
+boundary = ["square"]
+[regions.plate]""").replace('"left"]', '"left", "square"]')
+    model = parse_model(text)[1]
+    beside = put(model)
+    mesh, corners = beside.mesh, list_corner_elements(model, beside)
+    kept = mesh.curve[corners.element] == mesh.curve_names.index("square")
+    element, beyond = corners.element[kept], corners.beyond[kept]
+    assert len(element) == 16  # both ends of four legs, on both faces
+    chord = mesh.end - mesh.start
+    np.testing.assert_allclose((chord[beyond] / chord[element]).imag, 0.0, atol=1e-12)
+    middle = 0.5 * (mesh.start + mesh.end)
+    np.testing.assert_allclose(np.abs(middle[beyond] - middle[element]), 0.5 * np.abs(chord[beyond] + chord[element]))
+
+
 def test_errors_against_a_finer_solution_are_divided_by_nothing(plate: Model) -> None:
     # Where a crack turns the divisor is less than 1: the true error would be called larger than it is.
     beside = put(plate)
@@ -266,7 +287,6 @@ def test_far_from_the_goal_elements_in_corners_are_halved_twice(plate: Model, fa
 
 
 def test_few_elements_in_corners_are_halved_as_often_as_their_errors_ask_for(plate: Model) -> None:
-    # Of jumps that fall with the root of the length: with 0.5, 1.5, 3 and 100 times what they may be.
     deeper = {name: np.zeros(count_elements(curve), dtype=int) for name, curve in plate.curves.items()}
     marked = {name: each.astype(bool) for name, each in deeper.items()}
     deeper["bottom"][[0, 3]], marked["bottom"][[0, 3]] = 3, True
@@ -274,6 +294,7 @@ def test_few_elements_in_corners_are_halved_as_often_as_their_errors_ask_for(pla
     lengths = 8 * np.diff(finer.curves["bottom"].legs[0].element_fractions())
     assert lengths[0] == pytest.approx(1 / 16) and (lengths > 0.49).sum() == len(lengths) - 4
     assert (lengths[1:] / lengths[:-1] < 2.001).all()
+    # Of jumps that fall with the root of the length: one halving for 1.4 times what they may be, two for twice that.
     assert count_halvings(np.array([0.0, 0.5, 1.0, 1.3, 1.9, 2.5, 100.0])).tolist() == [0, 0, 0, 0, 1, 2, 3]
 
 

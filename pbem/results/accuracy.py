@@ -12,10 +12,11 @@ from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.end_grading import ContactEnd
 from pbem.model.model import Model
-from pbem.model.refinement import bisect_elements, count_elements
+from pbem.model.refinement import TIP_PART, bisect_elements, count_elements
 from pbem.results.contact_ends import find_contact_ends
 from pbem.results.estimator import Estimator
 from pbem.results.rates import list_corner_ends
+from pbem.results.stiff_tips import POWER
 from pbem.solve.problem.step import ContactState
 
 # What `analysis.accuracy` is asked of, and how it is called.
@@ -43,7 +44,8 @@ ALIKE = 0.1
 # Far from the goal elements in corners are halved twice where no larger part of all is marked, as else errors come from
 # everywhere, and where cracks turn, as the power is known to be small there.
 FEW = 0.25
-# By their errors up to so many times more than once, of jumps that fall with this power of the length.
+# By their errors elements are halved up to so many times more than once; those of jumps in corners fall with this power
+# of the length.
 MOST_DEEPER, CORNER_RATE = 3, 0.5
 # And those with nearly the energy of the last one that is: what is symmetrical stays so.
 AS_LAST = 0.9
@@ -107,12 +109,14 @@ class Pass:
 class Decision:
     """What follows a pass: sentences for the log; the elements to be halved (gently: see `bisect_elements`; far: those
     in corners twice), None if there is no further pass for the accuracy; why that cannot be reached, empty if it was or
-    was not asked for; where contacts end within elements that are too long, if that is asked for. deeper: how often the
-    elements in corners are to be halved again, per curve as `marked`, if few are."""
+    was not asked for; where contacts end within elements that are too long, if that is asked for. deeper, shorter: how
+    often the elements in corners, if few are halved, and those at tips are to be halved again, per curve as `marked`.
+    """
 
     notes: tuple[str, ...] = ()
     marked: Mapping[str, Bool] | None = None
     deeper: Mapping[str, Integer] | None = None
+    shorter: Mapping[str, Integer] | None = None
     gently: bool = False
     far: bool = False
     failure: str = ""
@@ -160,38 +164,52 @@ def decide(
     others = max((error for name, error in reached.errors.items() if name != ASKED["jumps"]), default=0.0)
     alone = others * SAFETY <= accuracy and max(each.max(initial=0.0) for each in local.values()) >= 0.5 * reached.worst
     marked = mark_elements(model, mesh, comparison.energy, comparison.local, accuracy, reached.worst, alone)
-    deeper = {name: count_halvings(each * SAFETY / accuracy) for name, each in local.items()}
+    deeper = {name: count_halvings(each * SAFETY / accuracy, CORNER_RATE) for name, each in local.items()}
+    tip_rate = POWER[model.analysis.order] * np.log2(1 / TIP_PART)
+    shorter = {name: count_halvings(each * SAFETY / accuracy, tip_rate)
+               for name, each in _spread_to_curves(model, mesh, comparison.at_tips).items()}  # fmt: skip
     near = reached.worst * SAFETY <= NEAR ** (model.analysis.order + 1) * accuracy
-    return Decision((says,), marked, deeper, near, far=reached.worst > FAR * accuracy)
+    return Decision((says,), marked, deeper, shorter, near, far=reached.worst > FAR * accuracy)
 
 
-def count_halvings(excess: Real) -> Integer:
-    """How often elements in corners are to be halved after the first time, by their errors over what they may be."""
-    return np.clip(np.ceil(np.log2(np.maximum(excess, 1.0)) / CORNER_RATE) - 1, 0, MOST_DEEPER).astype(np.int64)
+def count_halvings(excess: Real, rate: float) -> Integer:
+    """How often elements are to be halved after the first time, by their errors over what they may be; these fall by
+    2^rate when an element is."""
+    return np.clip(np.ceil(np.log2(np.maximum(excess, 1.0)) / rate) - 1, 0, MOST_DEEPER).astype(np.int64)
 
 
 def refine_marked(model: Model, decision: Decision) -> Model:
     """The model of the next pass. Where few elements are marked those in corners are halved as often as their errors
     ask for, far from the goal at least twice: there errors fall with a small power of their length, whatever the order.
-    See FEW."""
+    See FEW. So are those at tips whose lengths alone make the errors of K.
+    """
     assert decision.marked is not None
     finer = bisect_elements(model, decision.marked, decision.gently)
     few = np.concatenate(list(decision.marked.values())).mean() <= FEW
-    corners = list_corner_ends(model)
-    again = np.zeros(len(corners), dtype=np.int64)
+    corners, tips = list_corner_ends(model), _list_tip_elements(model)
+    again = np.zeros(len(corners) + len(tips), dtype=np.int64)
     for number, end in enumerate(corners):
         if decision.marked[end.curve][end.element]:
             turns = end.curve in model.crack_tips and end.power < 1
             again[number] = decision.far and (few or turns)
             if few and decision.deeper is not None:
                 again[number] = max(again[number], decision.deeper[end.curve][end.element])
+    if decision.shorter is not None:
+        again[len(corners) :] = [decision.shorter[curve][element] for curve, element in tips]
     while again.any():
         marked = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in finer.curves.items()}
-        for end, times in zip(list_corner_ends(finer), again, strict=True):
-            marked[end.curve][end.element] |= times > 0
+        places = [(end.curve, end.element) for end in list_corner_ends(finer)] + _list_tip_elements(finer)
+        for (curve, element), times in zip(places, again, strict=True):
+            marked[curve][element] |= times > 0
         finer = bisect_elements(finer, marked)
         again = np.maximum(again - 1, 0)
     return finer
+
+
+def _list_tip_elements(model: Model) -> list[tuple[str, int]]:
+    """Curve and element (along all its legs) at every tip of a crack."""
+    return [(name, (count_elements(model.curves[name]) - 1) * end)
+            for name, is_tip in model.crack_tips.items() for end in (0, 1) if is_tip[end]]  # fmt: skip
 
 
 def _spread_to_curves(model: Model, mesh: Mesh, values: Real) -> dict[str, Real]:

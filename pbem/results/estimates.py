@@ -102,7 +102,7 @@ class Comparison:
 
     Where to refine, the largest over the steps so far, on each element of the run's mesh: energy (2, e) of the
     difference of displacements and of tractions (stress times length squared); local (e,): estimated error of opening
-    and slip over the largest jump in the model, and of K where it comes from the length of the element at the tip.
+    and slip over the largest jump in the model, and of K where the length of the element at the tip makes it: at_tips.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Comparison:
         laws = collect_laws(model, mesh)
         self._gap = laws.gap
         self._stuck_ends, self._stiff_tips = StuckEnds(model, mesh, laws), StiffTips(model, mesh, laws)
-        self.energy, self.local = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
+        self.energy, (self.local, self.at_tips) = np.zeros((2, mesh.elements)), np.zeros((2, mesh.elements))
         self.scales = Scales()
         if beside is not None:
             self._others = list(sort_pairs(beside.mesh).items())
@@ -198,8 +198,7 @@ class Comparison:
     def _subtract(
         self, step: Step, second: Step, beside: Beside, energy: Real, least_jumps: Real, jumps: Real, ends: Ends
     ) -> Estimates:
-        """What the two solutions differ by, over the divisors (theory, 77); least_jumps: of `_bound_jumps`, jumps: of
-        `_divide_jumps`."""
+        """Differences over the divisors (theory, 77); least_jumps, jumps: of `_bound_jumps` and `_divide_jumps`."""
         mine, other = sum_reactions(self._model, self._mesh, step), sum_reactions(beside.model, beside.mesh, second)
         forces = (mine - other) / self._divisors.of_forces(energy)
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside, jumps, ends)
@@ -249,7 +248,8 @@ class Comparison:
         by_end, names = np.nan_to_num(least).max(axis=0) / (self.scales.factors or np.inf), list(self._model.crack_tips)
         for crack, end in np.argwhere(by_end > 0):
             element = self._mesh.pairs.slave[self._sorted[names[crack]][-end]] // (self._mesh.order + 1)
-            self.local[element] = max(self.local[element], by_end[crack, end])
+            self.at_tips[element] = max(self.at_tips[element], by_end[crack, end])
+        np.maximum(self.local, self.at_tips, out=self.local)
 
     def _subtract_pairs(
         self, mine: ContactState, other: ContactState, beside: Beside, jumps: Real, ends: Ends

@@ -295,7 +295,18 @@ def test_few_elements_in_corners_are_halved_as_often_as_their_errors_ask_for(pla
     assert lengths[0] == pytest.approx(1 / 16) and (lengths > 0.49).sum() == len(lengths) - 4
     assert (lengths[1:] / lengths[:-1] < 2.001).all()
     # Of jumps that fall with the root of the length: one halving for 1.4 times what they may be, two for twice that.
-    assert count_halvings(np.array([0.0, 0.5, 1.0, 1.3, 1.9, 2.5, 100.0])).tolist() == [0, 0, 0, 0, 1, 2, 3]
+    assert count_halvings(np.array([0.0, 0.5, 1.0, 1.3, 1.9, 2.5, 100.0]), 0.5).tolist() == [0, 0, 0, 0, 1, 2, 3]
+
+
+def test_elements_at_tips_are_divided_as_often_as_k_asks_for_however_many_others_are(plate: Model) -> None:
+    # Each time at two thirds.
+    shorter = {name: np.zeros(count_elements(curve), dtype=int) for name, curve in plate.curves.items()}
+    marked = {name: np.ones(len(each), dtype=bool) for name, each in shorter.items()}
+    shorter["after"][[3, -1]] = shorter["leg"][0] = 2
+    once, finer = (refine_marked(plate, Decision(marked=marked, shorter=each)) for each in (None, shorter))
+    for name, element, expected in (("after", -1, 4 / 9), ("leg", 0, 4 / 9), ("leg", -1, 1.0), ("before", 0, 1.0)):
+        before, after = (np.diff(model.curves[name].legs[0].element_fractions()) for model in (once, finer))
+        assert after[element] / before[element] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("alone", [False, True])

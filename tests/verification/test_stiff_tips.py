@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import cmath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import pbem
 from pbem.case.build import parse_model
 from pbem.results import stiff_tips
+from pbem.solve.problem.step import SilentReporter
 from pbem.storing import make_estimator
 from tests.verification.proofs.proof import Solved, solve_model, write_case
 
@@ -17,15 +20,35 @@ YOUNG, POISSON, HALF = 70.0, 0.3, 2.5
 MODULUS = YOUNG / (1 - POISSON**2)
 
 
+class CountPasses(SilentReporter):
+    """Counts those for `analysis.accuracy`."""
+
+    count = 0
+
+    def note(self, text: str) -> None:
+        self.count += text.startswith("accuracy, pass")
+
+    tell = note
+
+
 def make_crack(
     stiffness: float, elements: int, order: int, *, turn: float = 0.0, unit: float = 1.0, stress: float = 1.0,
     **law: Any,
 ) -> Solved:
     """A closed crack of length 2 HALF, sheared, whose joint has a stiffness in E' over HALF."""
+    tables = write_crack(stiffness, elements, order, turn=turn, unit=unit, stress=stress, **law)
+    return solve_model(parse_model(write_case(tables))[1])
+
+
+def write_crack(
+    stiffness: float, elements: int, order: int, *, turn: float = 0.0, unit: float = 1.0, stress: float = 1.0,
+    **law: Any,
+) -> dict[str, Any]:
+    """Its tables."""
     along, joint = cmath.rect(HALF * unit, turn), stiffness * MODULUS * stress / (HALF * unit)
     spin = cmath.exp(2j * turn)
     mean, deviator = -1.2 * stress, (0.1 + 0.5j) * spin * stress
-    tables = {
+    return {
         "materials": {"rock": {"young": YOUNG * stress, "poisson": POISSON}},
         "curves": {"crack": {"points": [-along, along], "elements": elements}},
         "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}},
@@ -34,7 +57,6 @@ def make_crack(
         "remote": {"sxx": mean + deviator.real, "syy": mean - deviator.real, "sxy": deviator.imag},
         "analysis": {"order": order, "steps": 1},
     }  # fmt: skip
-    return solve_model(parse_model(write_case(tables))[1])
 
 
 def estimate(solved: Solved) -> np.ndarray:
@@ -84,3 +106,20 @@ def test_the_elements_at_tips_are_told_to_be_refined() -> None:
     at_tips = solved.mesh.pairs.slave[pairs[[0, -1]]] // 3
     assert local[at_tips].min() > 0.9 * row["relative_factors"]
     assert np.delete(local, at_tips).max() < 0.1 * local[at_tips].min()
+
+
+def test_accuracy_is_reached_in_few_passes_where_a_joint_is_stiff(tmp_path: Path) -> None:
+    """Divided once in a pass, at two thirds, 22 passes were asked for, and 20 are the most."""
+    stiffness = 3e3
+    tables = write_crack(stiffness, 4, 1)
+    tables["analysis"]["accuracy"] = 1e-2
+    path = tmp_path / "crack.toml"
+    path.write_text(write_case(tables))
+    passes = CountPasses()
+    results = pbem.run(path, tmp_path / "crack.h5", reporter=passes)
+    # What the joint stores ahead of the tip in a unit of length, t^2/2k, is released: K^2/E' of a long crack.
+    expected = np.array([-1.3, 0.5]) * (HALF / (2 * stiffness)) ** 0.5
+    tip = results.tips["crack"]
+    np.testing.assert_allclose([tip.KI[-1], tip.KII[-1]], np.tile(expected, (2, 1)).T, rtol=6e-3)
+    assert results.status == "finished"
+    assert 2 < passes.count < 9

@@ -33,6 +33,8 @@ from pbem.model.support_motions import (
 from pbem.parallel import do_on_first
 from pbem.solve.problem.problem import Problem
 
+# Velocities of regions that differ by less than this part of the largest are one: they come from a null space.
+ALIKE = 1e-6
 # Faces that lie in each other by less than this part of the largest displacement touch.
 ROUNDING = 1e-9
 
@@ -137,8 +139,7 @@ def _find_composite(problem: Problem, motions: tuple[RigidBodyMode, ...]) -> lis
     for group in group_motions(motions):
         regions = set(group[0].regions)
         whole = len(regions) > 1 and all(
-            set(motion.regions) == regions and len({motion.velocities[name] for name in regions}) == 1
-            for motion in group
+            set(motion.regions) == regions and move_as_one(motion, problem.model.size) for motion in group
         )
         if not whole:
             continue
@@ -146,6 +147,12 @@ def _find_composite(problem: Problem, motions: tuple[RigidBodyMode, ...]) -> lis
         if (inside[pairs.first] == inside[pairs.second]).all():
             found.append([number[id(motion)] for motion in group])
     return found
+
+
+def move_as_one(motion: RigidBodyMode, size: float) -> bool:
+    """Whether all regions of a motion move alike, but for rounding; size: of the model, length."""
+    velocities = np.array([(a, w * size) for a, w in motion.velocities.values()])
+    return bool(np.abs(velocities - velocities[0]).max() <= ALIKE * np.abs(velocities).max())
 
 
 def _weigh(problem: Problem, regions: Sequence[str]) -> Real:

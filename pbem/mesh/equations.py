@@ -74,8 +74,8 @@ def choose_equations(model: Model) -> Equations:
                          if any(legs) and not any(elements[number, curve]))  # fmt: skip
     if len(notes) > MOST_NOTES:
         scheme = model.analysis.scheme
-        notes = [f"{len(notes)} curves keep the displacement equation as one face of a slot or thin part: "
-                 f"{scheme} has traction equations on both faces, which do not distinguish them"]  # fmt: skip
+        notes = [f"{len(notes)} curves keep the displacement equation at slots, thin parts or cracks: "
+                 f"there traction equations of {scheme} hardly tell faces apart, or hardly resist bending"]  # fmt: skip
     if lost:
         names = list_names([f"'{curve}'" for curve in lost], MOST_NOTES)
         notes.append(f"too few elements for {model.analysis.scheme}: all of those of {names} are at corners or ends of "
@@ -125,12 +125,15 @@ def _explain_strips(
     narrowest: dict[str, Strip] = {}
     for strip in sorted(strips, key=lambda each: each.width, reverse=True):
         narrowest |= {leg[0]: strip for leg in (strip.first, strip.second) if leg in kept}
+    # Across a part may be an inner loop, which has no traction equation.
+    scheme = model.analysis.scheme
     return [
         f"region {region.name} keeps the displacement equation on {curve}, one face of a "
-        f"{f'part {strip.width:.3g} thick' if strip.inside else f'slot {strip.width:.3g} wide'}: "
-        f"{model.analysis.scheme} has traction equations on both faces, which do not distinguish them"
+        + (f"part {strip.width:.3g} thick: {scheme} has a traction equation there, which hardly resists its bending"
+           if strip.inside else f"slot {strip.width:.3g} wide: "
+           f"{scheme} has traction equations on both faces, which do not distinguish them")
         for curve, strip in narrowest.items()
-    ]
+    ]  # fmt: skip
 
 
 def _explain_beside(model: Model, region: Region, beside: Mapping[LegNumber, str]) -> list[str]:

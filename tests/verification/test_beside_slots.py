@@ -52,6 +52,20 @@ def test_one_face_of_a_slot_takes_the_traction_equation_and_the_faces_beside_it_
     assert "right_low" in " ".join(equations.notes) and "beside" in " ".join(equations.notes)
 
 
+def test_of_a_thin_part_beside_a_hole_one_face_is_said_to_have_had_a_traction_equation() -> None:
+    """Faces of holes have none with any scheme: both faces of the part were said to have it."""
+    model = parse_model(write_case({
+        "materials": {"rock": {"young": 1000.0, "poisson": 0.2}},
+        "curves": {"hole": {"center": [0.93, 0.0], "radius": 1.0, "elements": 32},
+                   "outer": {"center": [0.0, 0.0], "radius": 2.0, "elements": 32}},
+        "regions": {"ring": {"material": "rock", "boundary": ["hole", "outer"]}},
+        "boundary": {"hole": {"pressure": 1.0}},
+        "analysis": {"scheme": "THST"},
+    }))[1]  # fmt: skip
+    (note,) = [text for text in choose_equations(model).notes if "part 0.07" in text]
+    assert "on outer, one face" in note and "resists its bending" in note and "both faces" not in note
+
+
 def solve_slot_within(width: float, scheme: str, order: int, elements: int) -> float:
     """How far the top of a plate of 3 by 2 moves, that is clamped below and pulled at the top, around a slot within."""
     corners = {"bottom": (-1j, 3 - 1j), "right": (3 - 1j, 3 + 1j), "top": (3 + 1j, 1j), "left": (1j, -1j)}

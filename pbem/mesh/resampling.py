@@ -28,8 +28,9 @@ SMOOTH = 1e-6
 
 @dataclass(frozen=True)
 class Resampling:
-    """mesh: of finer elements of order 3, without pairs; parts (e,): into how many each element of the run is cut, in
-    turn; displacement, traction (new nodes, nodes): from the values at the nodes of the run to those at its nodes."""
+    """mesh: of finer elements of order 3, without pairs; parts (e,): into how many each chosen element of the run is
+    cut, in turn; displacement, traction (new nodes, nodes): from the values at the nodes of the run to those at its
+    nodes."""
 
     mesh: Mesh
     parts: Integer
@@ -37,12 +38,13 @@ class Resampling:
     traction: sparse.csr_matrix
 
 
-def resample(mesh: Mesh) -> Resampling:
-    """Elements of order 3 for those of a mesh, and what takes values there."""
-    parts = np.where((mesh.tip > 0) | (mesh.order < 2), 1, 2)
-    parent = np.repeat(np.arange(mesh.elements), parts)
+def resample(mesh: Mesh, chosen: Integer | None = None) -> Resampling:
+    """Elements of order 3 for those of a mesh, or for chosen ones (e,) that rise, and what takes values there."""
+    chosen = np.arange(mesh.elements) if chosen is None else chosen
+    parts = np.where((mesh.tip[chosen] > 0) | (mesh.order < 2), 1, 2)
+    parent, of = np.repeat(chosen, parts), np.repeat(parts, parts)
     piece = np.arange(len(parent)) - np.repeat(np.cumsum(parts) - parts, parts)
-    first, last = piece / parts[parent], (piece + 1) / parts[parent]
+    first, last = piece / of, (piece + 1) / of
     fine = _cut(mesh, parent, first, last)
     along = first[:, None] + (last - first)[:, None] * fine.geometry.fractions(_place(fine))
     return Resampling(fine, parts, _join_displacements(mesh, parent, along), _join_tractions(mesh, fine, parent, along))

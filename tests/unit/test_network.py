@@ -250,6 +250,32 @@ def test_stretches_on_a_line_are_cut_at_ends_and_vertices_alone(seed: int) -> No
         assert nodes == {start, begin, bend}
 
 
+@pytest.mark.parametrize("place", [0j, 5.3e5 + 4.2e6j])
+def test_traces_that_end_on_another_at_small_angles_are_cut_there_alone(place: complex) -> None:
+    """Rounding makes half of them cross it, too, at up to the rounding over the angle from their ends."""
+    random_numbers = random.Random(7)
+    for _ in range(60):
+        along = 300 * cmath.rect(1.0, random_numbers.uniform(0.0, 2 * math.pi))
+        start = place + complex(random_numbers.uniform(-300, 300), random_numbers.uniform(-300, 300))
+        end = start + random_numbers.uniform(0.2, 0.8) * along
+        angle = random_numbers.choice([-1, 1]) * 10 ** random_numbers.uniform(-6.0, -1.0)
+        traces = draw(a=[start, start + along], b=[end, end + 0.15 * along * cmath.exp(1j * angle)])
+        network = cut_network(traces, 0.0)
+        assert sorted(network.pieces) == ["a.1", "a.2", "b"] and list_kinds(network) == ["T"]
+        assert [len(curve.legs) for curve in network.pieces.values()] == [1, 1, 1]
+
+
+@pytest.mark.parametrize("place", [0j, 5.3e5 + 4.2e6j])
+def test_traces_that_cross_at_small_angles_are_cut(place: complex) -> None:
+    random_numbers = random.Random(8)
+    for _ in range(60):
+        along = 300 * cmath.rect(1.0, random_numbers.uniform(0.0, 2 * math.pi))
+        off = 1j * along * 10 ** random_numbers.uniform(-8.0 if not place else -6.0, -1.0)
+        traces = draw(a=[place, place + along], b=[place + 0.1 * along - off, place + 0.8 * along + off])
+        network = cut_network(traces, 0.0)
+        assert sorted(network.pieces) == ["a.1", "a.2", "b.1", "b.2"] and list_kinds(network) == ["X"]
+
+
 def describe(network: Network, unit: float = 1.0) -> tuple[Counter[str], Counter[str], list[float]]:
     lengths = sorted(curve.length / unit for curve in network.pieces.values())
     areas = sorted(block.area / unit**2 for block in network.blocks)

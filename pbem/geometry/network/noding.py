@@ -146,7 +146,7 @@ def _cross_straight(
     edges: _Edges, one: Integer, other: Integer, rounding: float
 ) -> tuple[Integer, Complex]:
     """Of pairs of straight edges those that cross, and where; those that share a node do not, nor do those of which one
-    lies on the line of the other within the rounding: there the place would be that of the rounding."""
+    ends on the other within the rounding: they are cut there, and the place would be that of the rounding."""
     nodes = [(edges.first, edges.first), (edges.first, edges.second), (edges.second, edges.first),
              (edges.second, edges.second)]  # fmt: skip
     apart = np.ones(len(one), dtype=bool)
@@ -156,15 +156,17 @@ def _cross_straight(
     a, b, c, d = edges.shapes.start[one], edges.shapes.end[one], edges.shapes.start[other], edges.shapes.end[other]
 
     def side(start: Complex, end: Complex, point: Complex) -> Complex:
-        return (np.conj(end - start) * (point - start)).imag
+        """How far along an edge a point is, and (imaginary) to its left, both times its length."""
+        return np.asarray(np.conj(end - start) * (point - start))
 
-    before, after = side(c, d, a), side(c, d, b)
-    left, right = side(a, b, c), side(a, b, d)
-    crossing = (before * after < 0) & (left * right < 0)
-    crossing &= np.maximum(np.abs(before), np.abs(after)) > rounding * np.abs(d - c)
-    crossing &= np.maximum(np.abs(left), np.abs(right)) > rounding * np.abs(b - a)
+    before, after, left, right = side(c, d, a), side(c, d, b), side(a, b, c), side(a, b, d)
+    crossing = (before.imag * after.imag < 0) & (left.imag * right.imag < 0)
+    for place, length in ((before, np.abs(d - c)), (after, np.abs(d - c)), (left, np.abs(b - a)),
+                          (right, np.abs(b - a))):  # fmt: skip
+        # Half of it: such ends are among the nodes that edges pass for sure.
+        crossing &= (np.abs(place.imag) > 0.5 * rounding * length) | (place.real < 0) | (place.real > length**2)
     one, other, a, b = one[crossing], other[crossing], a[crossing], b[crossing]
-    t = before[crossing] / (before[crossing] - after[crossing])
+    t = before.imag[crossing] / (before.imag[crossing] - after.imag[crossing])
     return np.stack([one, other], axis=1), a + (b - a) * t
 
 

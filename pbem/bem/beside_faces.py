@@ -120,7 +120,7 @@ class BesideFaces:
         parent = np.repeat(self._beside, self._resampling.parts)
         base = np.where(mesh.crack[parent], 0.0, displacement[parent * (mesh.order + 1)])
         of = np.repeat(base, self._resampling.mesh.order + 1).repeat(np.diff(matrix.indptr))
-        terms = matrix.data * (displacement[matrix.indices] - of)
+        terms = matrix.data * (displacement[matrix.indices] - np.where(mesh.node_crack[matrix.indices], 0.0, of))
         beyond = sparse.csr_matrix((terms, matrix.indices, matrix.indptr), shape=matrix.shape).sum(axis=1)
         return _Moved(base, np.asarray(beyond).ravel())
 

@@ -77,7 +77,7 @@ def _join_displacements(mesh: Mesh, parent: Integer, along: Real) -> sparse.csr_
     """along (new elements, 4): the new nodes' fractions of the length of their old element."""
     count, each = mesh.elements, mesh.order + 1
     nodes = mesh.geometry.fractions(_place(mesh))
-    ends = _read_ends(mesh, nodes)  # (2 count, nodes) in the quotient by the roots at tips
+    ends = _close_around(mesh) @ _read_ends(mesh, nodes)  # (2 count, nodes) in the quotient by the roots at tips
     node_root = _take_roots(mesh, np.arange(count), nodes)
     new_root = _take_roots(mesh, parent, along)
     known = np.column_stack([np.zeros(count), nodes, np.ones(count)])
@@ -136,6 +136,39 @@ def _read_ends(mesh: Mesh, nodes: Real) -> sparse.csr_matrix:
     columns = np.stack([np.tile(np.arange(count)[:, None], (1, 2)), other], axis=2)[..., None] * each + np.arange(each)
     rows = np.repeat(np.arange(2 * count), 2 * each)
     return sparse.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(2 * count, count * each))
+
+
+def _close_around(mesh: Mesh) -> sparse.csr_matrix:
+    """From values at the ends (2 e) of the elements to those that close around places where more than two ends meet, or
+    two of cracks: mouths on boundaries and crossings.
+
+    Around a place inside or on a boundary displacements come back to what they were: those of elements that start
+    there, jumps on cracks, are together those of elements that end there. What is left is a dislocation, whose stress
+    is as large as its distance is small; it is parted among all of them alike.
+    """
+    count = mesh.elements
+    following, _ = find_neighbours(mesh)
+    vertices = np.stack([mesh.start, mesh.end], axis=1).ravel()
+    left = np.ones((count, 2), dtype=bool)
+    goes_on = np.flatnonzero(following >= 0)
+    left[goes_on, 1] = left[following[goes_on], 0] = False
+    _, place, number = np.unique(
+        np.column_stack([np.repeat(mesh.region, 2), vertices.real, vertices.imag]), axis=0, return_inverse=True,
+        return_counts=True)  # fmt: skip
+    place = place.ravel()
+    at_tip = np.stack([mesh.tip == 1, mesh.tip == 2], axis=1).ravel()
+    closed = (number >= 2) & (np.bincount(place, at_tip | ~left.ravel(), minlength=len(number)) == 0)
+    chosen = np.flatnonzero(closed[place])
+    chosen = chosen[np.argsort(place[chosen], kind="stable")]
+    sizes = number[place[chosen]]  # as often as there are ends
+    first = np.searchsorted(place[chosen], place[chosen])
+    rows = np.repeat(chosen, sizes)
+    columns = chosen[np.repeat(first, sizes) + np.arange(len(rows)) - np.repeat(np.cumsum(sizes) - sizes, sizes)]
+    sense = np.where(np.arange(2 * count) % 2 == 0, 1.0, -1.0)
+    root = _take_roots(mesh, np.arange(count), np.tile([0.0, 1.0], (count, 1))).ravel()
+    parts = sense[rows] * sense[columns] * root[columns] / (root[rows] * np.repeat(sizes, sizes))
+    return sparse.identity(2 * count, format="csr") - sparse.csr_matrix(
+        (parts, (rows, columns)), shape=(2 * count, 2 * count))
 
 
 def find_neighbours(mesh: Mesh) -> tuple[Integer, Bool]:

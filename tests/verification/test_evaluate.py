@@ -356,3 +356,23 @@ def test_short_elements_at_the_end_of_a_long_one(tmp_path: Path) -> None:
     assert (locate_points(run_again.mesh, [0], beside @ [1, 1j] - run_again.model.origin).element < 0).all()
     # Beside the corner itself, by the shortest element that ends there.
     assert results.evaluate([[1e-9, 1e-9]]).on_boundary.all()
+
+
+def test_the_mouth_of_a_crack_bears_nothing(tmp_path: Path) -> None:
+    """Where the jump of its first element and what the displacements of the side differ by were not one, a dislocation
+    made 0.54 of the load a hundred-thousandth from the mouth (order 1), and 0.09 (order 2)."""
+    around = np.radians([100.0, 135.0, 170.0, 175.0, -135.0, -95.0])
+    points = to_points(2 + 1j + np.outer([1e-2, 1e-3, 1e-4, 1e-5], np.exp(1j * around)).ravel())
+    lines = {"foot": [[0, 0], [2, 0]], "low": [[2, 0], [2, 1]], "high": [[2, 1], [2, 2]], "top": [[2, 2], [0, 2]],
+             "left": [[0, 2], [0, 0]], "crack": [[2, 1], [1, 1]]}  # fmt: skip
+    for order, allowed in ((1, 0.02), (2, 0.01), (3, 0.005)):
+        results = run(
+            tmp_path / f"mouth{order}.h5",
+            curves={name: {"points": ends, "elements": 5} for name, ends in lines.items()},
+            regions={"body": {"material": "rock", "boundary": list(lines)[:5], "cracks": ["crack"]}},
+            boundary={"foot": {"ux": 0.0, "uy": 0.0}, "top": {"ty": 1.0}},
+            analysis={"order": order}, output={"points": points.tolist()},
+        )  # fmt: skip
+        assert results.interior is not None
+        for found in (results.evaluate(points, [-1]).stress[0], results.interior.stress[-1]):
+            assert np.abs(found).max() < allowed

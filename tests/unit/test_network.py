@@ -276,6 +276,26 @@ def test_traces_that_cross_at_small_angles_are_cut(place: complex) -> None:
         assert sorted(network.pieces) == ["a.1", "a.2", "b.1", "b.2"] and list_kinds(network) == ["X"]
 
 
+def test_traces_that_end_on_an_arc_at_small_angles_are_cut_there_and_where_they_cross_it() -> None:
+    """Rounding made 33 of 80 cross it beside their end, too; chords do cross it once more."""
+    random_numbers = random.Random(3)
+    for _ in range(60):
+        center = complex(random_numbers.uniform(-1, 1), random_numbers.uniform(-1, 1))
+        out = cmath.rect(1.0, random_numbers.uniform(0.0, 2 * math.pi))
+        angle = 10 ** random_numbers.uniform(-4.0, -1.0)
+        for inwards, count in ((False, 2), (True, 3)):
+            end = center + out + 0.4 * 1j * out * cmath.exp(1j * angle * (1 if inwards else -1))
+            circle = draw_circle("circle", center, 1.0, DIVISION)
+            network = cut_network({"circle": circle, **draw(trace=[center + out, end])}, 0.0)
+            legs = [leg for curve in network.pieces.values() for leg in curve.legs]
+            assert min(leg.length for leg in legs) > 1e-4
+            nodes = {node for leg in legs if not leg.sweep for node in (leg.start, leg.end)}
+            assert len(nodes) == count
+            if inwards:
+                chord = min(nodes, key=lambda node: abs(abs(node - center - out) - 2 * math.sin(angle)))
+                assert abs(chord - center - out) == pytest.approx(2 * math.sin(angle), rel=1e-6)
+
+
 def describe(network: Network, unit: float = 1.0) -> tuple[Counter[str], Counter[str], list[float]]:
     lengths = sorted(curve.length / unit for curve in network.pieces.values())
     areas = sorted(block.area / unit**2 for block in network.blocks)

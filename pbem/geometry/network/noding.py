@@ -129,13 +129,27 @@ def _find_crossings(edges: _Edges, rounding: float) -> tuple[Integer, Complex]:
     pairs, places = _cross_straight(edges, one[~thick], other[~thick], rounding)
     more_pairs, more_places = [], []
     for i, j in zip(one[thick].tolist(), other[thick].tolist(), strict=True):
-        for point in meeting_points(_pick(edges.shapes, i), _pick(edges.shapes, j), rounding):
+        both = _pick(edges.shapes, i), _pick(edges.shapes, j)
+        for point in meeting_points(*both, rounding):
+            if _is_at_end(*both, point, rounding) or _is_at_end(*both[::-1], point, rounding):
+                continue
             more_pairs.append((i, j))
             more_places.append(point)
     return (
         np.concatenate([pairs, np.array(more_pairs, dtype=np.int64).reshape(-1, 2)]),
         np.concatenate([places, np.array(more_places, dtype=complex)]),
     )
+
+
+def _is_at_end(leg: Leg, other: Leg, point: complex, rounding: float) -> bool:
+    """Whether a leg ends on another one, from which it is not apart up to a point that both have: it is cut there."""
+    place = float(leg.project(point))
+    for t in (0.0, 1.0):
+        end, between = (complex(leg.point(np.array(at))) for at in (t, 0.5 * (t + place)))
+        apart = [abs(complex(other.point(np.clip(other.project(each), 0.0, 1.0))) - each) for each in (end, between)]
+        if apart[0] <= 0.5 * rounding and apart[1] <= rounding:
+            return True
+    return False
 
 
 def _pick(shapes: Elements, number: int) -> Leg:

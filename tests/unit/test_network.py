@@ -8,6 +8,7 @@ import math
 import random
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ import pytest
 from pbem.geometry.curve import Curve
 from pbem.geometry.intersection import enclosed_area
 from pbem.geometry.network import Network, cut_network
+from pbem.geometry.network.noding import UnsettledError, _refuse_nothing
+from pbem.geometry.network.strands import Strand
 from pbem.geometry.shape import Division, draw_circle, draw_polyline
 
 DIVISION = Division(elements=12)
@@ -327,6 +330,15 @@ def test_networks_move_turn_and_grow_with_their_traces(factor: complex, by: comp
     # 3e7 is known to 4e-9.
     assert found[2] == pytest.approx(expected[2], rel=1e-6, abs=3e-8)
     assert Counter(change.kind for change in network.changes)["cut"] > 100
+
+
+def test_parts_without_a_length_are_refused_with_their_places() -> None:
+    legs = draw(a=[0j, 2 + 1j, 3 + 1j])["a"].legs
+    _refuse_nothing([Strand("a", list(legs))])
+    with pytest.raises(UnsettledError) as raised:
+        _refuse_nothing([Strand("a", [legs[0], replace(legs[1], end=legs[1].start)])])
+    assert raised.value.places == [2 + 1j]
+
 
 
 @pytest.mark.parametrize("seed", range(3))

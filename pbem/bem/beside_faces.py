@@ -180,7 +180,8 @@ class BesideFaces:
 
     @cached_property
     def _kept(self) -> list[_Group | None]:
-        size = 5 * 2 * 2 * 8
+        """The groups whose rows are kept for the next step, as far as these fit; None in place of the others."""
+        size = 5 * 2 * 2 * np.dtype(float).itemsize  # of what a point has of a node, see _Rows
         kept: list[_Group | None] = []
         taken = 0
         for number, (_, places) in enumerate(self._groups):
@@ -190,6 +191,7 @@ class BesideFaces:
         return kept
 
     def _evaluate_group(self, number: int) -> _Group:
+        """The points of a group, with their rows on the elements that each is beside."""
         mesh, joined = self.mesh, self._resampling
         chosen, places = self._groups[number]
         point, element = (each[places] for each in self._pairs)

@@ -34,20 +34,20 @@ class _ElementNodes:
 
     def place(self, nodes: Integer) -> Complex:
         """Positions of nodes (k,)."""
-        element, local, _ = self._find(nodes)
+        element, local, _ = self.find(nodes)
         return np.asarray(self.elements.select(element).place(local)[:, 0])
 
     def find_normals(self, nodes: Integer) -> Complex:
         """Outward normals at nodes (k,)."""
-        element, local, _ = self._find(nodes)
+        element, local, _ = self.find(nodes)
         return np.ascontiguousarray(self.elements.select(element).normals(local)[:, 0])
 
     def weigh(self, nodes: Integer) -> Real:
         """Weights of nodes (k,)."""
-        element, local, weight = self._find(nodes)
+        element, local, weight = self.find(nodes)
         return np.asarray((self.elements.select(element).stretch(local) * weight[:, None])[:, 0])
 
-    def _find(self, nodes: Integer) -> tuple[Integer, Real, Real]:
+    def find(self, nodes: Integer) -> tuple[Integer, Real, Real]:
         """Elements of nodes (k,), their coordinates there (k, 1), and weights of these (k,)."""
         element, number = np.divmod(nodes, len(self.local))
         crack, chosen = self.crack[element], []
@@ -67,7 +67,7 @@ class _AlongCurves:
 
     def measure(self, pairs: Integer) -> Real:
         """Of pairs (k,), whose nodes are `first`."""
-        element, local, _ = self.nodes._find(self.first[pairs])
+        element, local, _ = self.nodes.find(self.first[pairs])
         own = self.nodes.elements.select(element)
         return np.asarray(self.before[element] + own.lengths * own.fractions(local)[:, 0])
 

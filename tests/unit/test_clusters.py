@@ -273,6 +273,20 @@ def test_clusters_settle_as_long_as_fewer_and_fewer_pairs_change() -> None:
     assert clusters.suits(search)
 
 
+def test_clusters_wait_where_a_search_begins_with_nearly_the_solution() -> None:
+    """As the second solution does, whose few changes single Newton steps settle for less than clusters take."""
+    problem = assemble(grow_branches(0, 6))
+    load, everywhere = problem.evaluate_load(0, 1.0), np.ones(problem.laws.count, dtype=bool)
+    clusters = ClusterSearch(problem, None, load, everywhere, np.ones(problem.laws.count))  # type: ignore[arg-type]
+    near, far = Search(50, begun_near=True), Search(50)
+    for counts, waits in (([9, 4], True), ([9, 4, 4], True), ([9, 4, 4, 3], True), ([9, 4, 4, 3, 3], False)):
+        near.counts = far.counts = counts
+        assert clusters.suits(far) and clusters.suits(near) is not waits
+    near.go_on_from_smoothed()
+    near.counts = [3]
+    assert clusters.suits(near)
+
+
 def test_searches_end_by_them_in_the_same_state(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:
     text = grow_branches(2, 12)
     settled = []

@@ -42,7 +42,7 @@ GIVEN = {
     "fixed_point": (),
     "hold": ("problem", "memory", "load", "settled", "floating"),
     "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "most_futile", "most_effort",
-               "proposal"),
+               "begun_near", "proposal"),
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
     "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape", "_along", "_alone", "_able"),
     "blocks": ("_problem", "_smooth", "_own", "_stiffness"),

@@ -28,6 +28,10 @@ MOST = 0.3
 FEW = 2e-2
 # ... and of the last so many times fewer than in all before.
 PATIENCE = 2
+# Iterations before clusters settle for the first time: what one leaves may be gone in the next; more where the search
+# began with nearly the solution, the modes of a finer mesh, which Newton's steps alone settle in two to four: each
+# takes less than clusters of so many pairs.
+PLAIN, PLAIN_IF_NEAR = 1, 4
 # The last width of the smoothed laws, as a part of the largest traction.
 NARROWEST = 1e-10
 
@@ -51,7 +55,8 @@ class ClusterSearch:
         changed, count = search.counts[-1], self._problem.laws.count
         if not (falls and 0 < changed <= MOST * count and self._smooth.any()) or search.level:
             return False
-        if len(search.counts) < 2 and not search.smoothed:
+        plain = PLAIN_IF_NEAR if search.begun_near else PLAIN
+        if len(search.counts) <= plain and not search.smoothed:
             return False
         return changed <= FEW * count or not search.may_sweep()
 

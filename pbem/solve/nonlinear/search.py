@@ -110,21 +110,21 @@ class Search:
     smoothed (pbem.solve.nonlinear.smooth_search). wary: whether changes that stall, and a full tangent that leads away,
     are met with caution where friction changes with slip. most_futile: see FUTILE. most_effort: what pivoting may take
     until fewer pairs change than ever (pbem.contact.pivoting.OperationCount): slender layers lift bit by bit.
+    begun_near: whether it begins with what is nearly the solution, which changes when clusters settle.
     """
 
     def __init__(
         self, most_pivoted: int, interface: Integer | None = None, excluded: Bool | None = None,
         varying: bool = False, sweeps: bool = False, wary: bool = False, most_futile: int = FUTILE,
-        most_effort: float = np.inf, smooths: bool = False,
+        most_effort: float = np.inf, smooths: bool = False, begun_near: bool = False,
     ) -> None:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
         self.most_futile, self.most_effort = most_futile, most_effort
         self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.sweeps, self.swept, self.smooths = sweeps, False, smooths
         self.unsettled = False  # whether it ended as modes came back, or took too long
-        self.wary = wary
+        self.wary, self.begun_near, self.plain = wary, begun_near, PLAIN
         self.smoothed = False  # whether it goes on from the modes of smoothed laws
-        self.plain = PLAIN
         self.restart()
 
     def restart(self) -> None:
@@ -137,19 +137,16 @@ class Search:
         self.group: Integer = np.zeros(0, dtype=np.int64)
         self.failed_group: Integer = self.group
         self.failed: Settled | None = None
-        self.futile = self.solved = 0
-        self.pause = self.paused = 0
+        self.futile = self.solved = self.pause = self.paused = 0
         self.widened, self.widening, self.narrow = 0, False, self.group
         self.collapse = ""  # what moves on, where contacts do not come to rest against dashpots
         self.restless = False  # whether they were asked, and neither that nor a state of rest was found
-        self.level = 0
-        self.sweeping = self.sweeps
+        self.level, self.sweeping = 0, self.sweeps
         self.returned = self.just_returned = False
         self.near, self.error, self.entered = NEAR, np.inf, 0
         self.seen: set[str] = set()
         # The states of modes that followed upon others at any level, and how many have done so again in turn.
-        self.next_of: dict[str, str] = {}
-        self.last, self.alike = "", 0
+        self.next_of, self.last, self.alike = dict[str, str](), "", 0
 
     def go_on_from_smoothed(self) -> None:
         """Begin anew from modes of smoothed laws: few pairs change, which groups that settle alone would disturb.
@@ -370,10 +367,12 @@ class Search:
         return True
 
 
-def list_searches(problem: Problem, tangent: TangentOperator, softened: bool = False) -> list[Search]:
+def list_searches(
+    problem: Problem, tangent: TangentOperator, softened: bool = False, begun_near: bool = False
+) -> list[Search]:
     """The searches of one step, one after the other where the former does not settle.
 
-    softened: whether softer contacts may be tried after them.
+    softened: whether softer contacts may be tried after them. begun_near: see Search.
     """
     settling, linear = tangent.settling, find_linear(problem.laws)
     sweeps = settling.nearby and not is_one_group(problem.mesh) and bool(linear.all())
@@ -386,7 +385,8 @@ def list_searches(problem: Problem, tangent: TangentOperator, softened: bool = F
     # Where no groups settle by themselves, blocks that cracks enclose are laid by smoothed laws nevertheless.
     alone = not sweeps and bool(problem.parts.block.any())
     return [
-        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary, futile, effort, sweeping or alone)
+        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary, futile, effort, sweeping or alone,
+               begun_near)
         for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying
     ]
 

@@ -26,6 +26,8 @@ KEPT = 0.05
 # of all interfaces, they have at most this part. On polygons with some such sides errors were up to 300 times the
 # estimated ones, beside interfaces that turn with such legs 80 times.
 SINGLE = 0.1
+# Lengths, and powers of distances, are alike that differ by no more than this part: rounding must not choose.
+ALIKE = 1e-9
 # Of elements that meet the longer is at most so many times as long, where elements are halved.
 WIDEST_RATIO = 2.0
 # The jump follows the root of the distance over the elements next to a tip, which are divided together: where one of
@@ -54,9 +56,10 @@ def coarsen_model(model: Model) -> CoarseModel | None:
     leaves too many of them, or whole interfaces, or long legs that have a single element (above order 0; of outer
     curves above order 1: constant elements may not hold what one linear element holds), the order is lowered instead.
     """
-    curves = {name: _merge_pairs(curve, _least_elements(model, name)) for name, curve in model.curves.items()}
-    before, after = (sum(count_elements(curve) for curve in each.values()) for each in (model.curves, curves))
     faces = {*model.interfaces, *(name for each in model.contacts.values() for name in (each.first, each.second))}
+    around = _Surroundings(model, faces)
+    curves = {name: _merge_pairs(curve, _least_elements(model, name), around) for name, curve in model.curves.items()}
+    before, after = (sum(count_elements(curve) for curve in each.values()) for each in (model.curves, curves))
     numbers = {name: count_elements(model.curves[name]) for name in faces}
     kept = sum(number for name, number in numbers.items() if count_elements(curves[name]) == number)
     single = _measure_single(model, faces) if model.analysis.order else 0.0
@@ -220,17 +223,84 @@ def _least_elements(model: Model, name: str) -> int:
     return 2 if model.analysis.tips and all(tips) else 1
 
 
-def _merge_pairs(curve: Curve, least: int) -> Curve:
-    merged = Curve(curve.name, tuple(_merge_leg(leg) for leg in curve.legs))
+class _Surroundings:
+    """What is around places, whatever the order and direction of curves, units and place of the model.
+
+    tips, faces: points at tips of cracks, and at ends of legs that are in contact or bonded.
+    """
+
+    def __init__(self, model: Model, faces: Iterable[str]) -> None:
+        self.tips = {point for name, is_tip in model.crack_tips.items()
+                     for point, here in zip(_list_ends(model.curves[name]), is_tip, strict=True) if here}  # fmt: skip
+        self.faces = {point for name in faces for leg in model.curves[name].legs for point in (leg.start, leg.end)}
+        ends = [(leg.start, leg.end) for curve in model.curves.values() for leg in curve.legs]
+        chords = np.array(ends, dtype=complex).reshape(-1, 2)
+        weight, middle = np.abs(chords[:, 1] - chords[:, 0]), chords.mean(axis=1)
+        whole = float(weight.sum()) or 1.0
+        self._centre = complex(weight @ middle) / whole
+        arm = middle - self._centre
+        # Of full circles alone all places are alike.
+        self._size = float(np.sqrt(weight @ np.abs(arm) ** 2 / whole)) or np.inf
+        arm = arm / self._size
+        # |z - m|^4 by powers of both, for the mean over all legs' middles m.
+        self._moments = np.array([[weight @ (arm**a * arm.conj() ** b) for b in range(3)] for a in range(3)]) / whole
+
+    def compare(self, one: complex, other: complex) -> int:
+        """1 where one place is farther from all curves than the other, -1 where the other is, 0 where both are alike.
+
+        Compared are the means of the distance's square, which is that from the centre, and of its fourth power.
+        """
+        first, second = ((each - self._centre) / self._size for each in (one, other))
+        for value, against in ((abs(first) ** 2, abs(second) ** 2), (self._raise(first), self._raise(second))):
+            if abs(value - against) > ALIKE * (value + against):
+                return 1 if value > against else -1
+        return 0
+
+    def _raise(self, place: complex) -> float:
+        signed = np.array([1.0, -2.0, 1.0])
+        powers = signed * place ** np.arange(2, -1, -1)
+        return float((powers @ self._moments @ powers.conj()).real)
+
+
+def _list_ends(curve: Curve) -> tuple[complex, complex]:
+    return curve.legs[0].start, curve.legs[-1].end
+
+
+def _merge_pairs(curve: Curve, least: int, around: _Surroundings) -> Curve:
+    merged = Curve(curve.name, tuple(_merge_leg(leg, around) for leg in curve.legs))
     return merged if count_elements(merged) >= least else curve
 
 
-def _merge_leg(leg: Leg) -> Leg:
-    """Pairs from both ends on; of an odd number one in the middle is kept."""
+def _is_nearer_end(leg: Leg, around: _Surroundings) -> bool:
+    """Whether the element that is kept of 3, 7, 11, ... is that after the middle pair, not that before it.
+
+    By what there is, not by the direction of the curve: the longer one, which leaves lengths even; else away from a
+    tip, an end of faces in contact, or another singular end, as errors there would not be seen; else the one that is
+    farther from all curves.
+    """
+    before, after = leg.elements // 4 * 2, leg.elements - 1 - leg.elements // 4 * 2
+    ends = leg.element_fractions()
+    lengths = np.diff(ends)[[before, after]]
+    if abs(lengths[0] - lengths[1]) > ALIKE * lengths.sum():
+        return bool(lengths[1] > lengths[0])
+    for at_start, at_end in (
+        (leg.start in around.tips, leg.end in around.tips), (leg.start in around.faces, leg.end in around.faces),
+        (leg.singular_start, leg.singular_end),
+    ):  # fmt: skip
+        if at_start != at_end:
+            return at_start
+    places = leg.point(0.5 * (ends[[before, after]] + ends[[before + 1, after + 1]]))
+    return around.compare(complex(places[1]), complex(places[0])) > 0
+
+
+def _merge_leg(leg: Leg, around: _Surroundings) -> Leg:
+    """Pairs from both ends on; of an odd number one in the middle is kept, or next to it: see `_is_nearer_end`."""
     count = leg.elements
     if count == 1:
         return leg
     middle = count // 2 // 2 * 2
+    if count % 4 == 3 and _is_nearer_end(leg, around):
+        middle += 2
     kept = [*range(0, middle + 1, 2), *range(middle + count % 2, count + 1, 2)]
     ends = leg.element_fractions()
     merged = ends[sorted(set(kept))]

@@ -62,6 +62,37 @@ def test_elements_are_merged_in_pairs(plate: Model) -> None:
                    zip(coarse.model.curves[name].legs, ends, strict=True))  # fmt: skip
 
 
+@pytest.mark.parametrize("elements", [3, 5, 7, 11])
+@pytest.mark.parametrize("graded", [False, True])
+def test_which_element_is_kept_does_not_depend_on_directions_units_or_order(
+    plate: Model, elements: int, graded: bool
+) -> None:
+    """Of 3, 7, 11 elements pairs cannot be merged alike from both ends."""
+    leg = Leg(0.5 + 0.5j, 1.5 + 0.7j, elements, refine_start=graded, power=2.0)
+    other = Leg(0.4 + 0.2j, 0.9 + 0.1j, 3)
+
+    def merge(legs: tuple[Leg, ...], names: tuple[str, ...], move: complex = 0j, turn: complex = 1.0) -> list[float]:
+        moved = {name: Curve(name, (replace(leg, start=turn * leg.start + move, end=turn * leg.end + move),))
+                 for name, leg in zip(names, legs, strict=True)}  # fmt: skip
+        model = replace(plate, curves=moved, conditions={}, interfaces={}, contacts={},
+                        crack_tips=dict.fromkeys(names, (True, True)))
+        coarse = coarsen_model(model)
+        assert coarse is not None
+        return list(coarse.model.curves["crack"].legs[0].element_fractions())
+
+    names, merged = ("crack", "other"), merge((leg, other), ("crack", "other"))
+    assert len(merged) == elements // 2 + 2
+    assert merge((other, leg), names[::-1]) == merged
+    assert merge((leg, other.reverse()), names, 1e5 - 3e5j) == merged
+    assert merge((leg, other), names, turn=1e-3 * (0.6 + 0.8j)) == merged
+    assert np.allclose(merge((leg.reverse(), other), names, 1e3), 1 - np.array(merged[::-1]), atol=1e-12)
+    assert merge((replace(leg, end=leg.start, center=0.5 + 1.0j, sweep=2 * np.pi, elements=elements + 16),) * 2, names,
+                 1e6)  # a full circle
+    if graded and elements != 5:  # where lengths differ the shorter ones are merged
+        ends = leg.element_fractions()
+        assert np.isin(ends[: elements // 4 * 2 + 1 : 2], merged).all() and ends[elements // 4 * 2 + 2] in merged
+
+
 @pytest.mark.parametrize(("order", "sides", "kind"), [
     (2, ("left",), "order"), (3, ("left",), "order"), (1, ("left",), "merged"), (2, (), "merged"),
 ])  # fmt: skip

@@ -24,6 +24,8 @@ from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
 from pbem.solve.estimate import second_solution
 from pbem.solve.estimate.coarser_mesh import MOST_ITERATIONS
+from pbem.solve.nonlinear import newton
+from pbem.solve.nonlinear.search import Search, list_searches
 from pbem.solve.problem.step import Step
 from pbem.storing import make_estimator
 from tests.cli.cli_sample import BLOCKS
@@ -368,17 +370,26 @@ def test_the_second_solution_searches_once(
     """The estimate of a run would else take most of its time. In the first step of this joint that dilates, faces do
     not settle on the coarser mesh."""
     asked, solve = [], second_solution.solve_step
+    begun_near: list[bool] = []
 
     def watch(problem: Any, tangent: Any, memory: Any, load: Any, reporter: Any, **options: Any) -> Any:
         before = reporter.iterations
         try:
-            return solve(problem, tangent, memory, load, reporter, **options)
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(newton, "list_searches", note)
+                return solve(problem, tangent, memory, load, reporter, **options)
         finally:
             asked.append(reporter.iterations - before)
+
+    def note(*arguments: Any) -> list[Search]:
+        searches = list_searches(*arguments)
+        begun_near.extend(each.begun_near for each in searches)
+        return searches
 
     monkeypatch.setattr(second_solution, "solve_step", watch)
     results = pbem.run("barton_joint", tmp_path / "joint.h5", operator=operator)
     assert max(asked) <= MOST_ITERATIONS
+    assert begun_near and all(begun_near)
     assert not results.errors.missing
 
 
@@ -653,3 +664,24 @@ def test_legs_of_cracks_with_a_single_element_are_not_left_out(tmp_path: Path) -
     # Of order 3 with twenty elements and more on each leg, to 1e-5.
     error = max(np.abs(tips.KI[-1] - [2.374448, 2.632812]).max(), np.abs(tips.KII[-1] - [0.982906, 0.398418]).max())
     assert 1.0 < error / 2.632812 / results.errors.relative["factors"][-1] < 6.0  # 16 without them
+
+
+def test_estimates_do_not_depend_on_directions_or_order_of_curves(tmp_path: Path) -> None:
+    """Of three elements on a leg one is kept on the coarser mesh: by the direction that took the pair at the tip or
+    the one where the crack turns, and errors of jumps differed by five times and more."""
+    points = {"kinked": [[-1.0, 0.3], [0.0, 0.0], [0.75, -0.5]], "other": [[1.6, -0.6], [2.6, 0.6]]}
+
+    def estimate(name: str, *, back: bool) -> list[float]:
+        names = list(points)[:: -1 if back else 1]
+        case: dict[str, Any] = {
+            "materials": {"rock": {"young": 1e4, "poisson": 0.25}},
+            "curves": {each: {"points": points[each][:: -1 if back else 1], "elements": 6 if each == "kinked" else 3}
+                       for each in names},
+            "regions": {"plane": {"material": "rock", "infinite": True, "cracks": names}},
+            "interfaces": {each: {"law": "coulomb", "friction": 0.3} for each in names},
+            "remote": {"sxx": -1.0, "syy": -4.0, "sxy": 3.0}, "analysis": {"steps": 1},
+        }  # fmt: skip
+        errors = pbem.run(case, tmp_path / name).errors
+        return [float(errors.relative[kind][-1]) for kind in ("jumps", "tractions", "factors")]
+
+    assert estimate("back.h5", back=True) == pytest.approx(estimate("forth.h5", back=False), rel=1e-3)

@@ -125,7 +125,7 @@ def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
 @dataclass(frozen=True)
 class CornerElements:
     """Elements (k,) of the second solution in corners, the elements next to them on their curves, away from the corner
-    (-1: none), and what differences of tractions that are singular there are divided by."""
+    (-1: none, or in a corner as well), and what differences of tractions that are singular there are divided by."""
 
     element: Integer
     beyond: Integer
@@ -146,10 +146,13 @@ def list_corner_elements(model: Model, beside: Beside) -> CornerElements:
     """The elements in corners of the mesh beside that of a model (theory, 126)."""
     at_corner, rows = _list_merged_ends(model, beside.model), []
     for name, own in list_curve_elements(beside.model, beside.mesh):
-        for end in at_corner.get(name, ()):
-            # On the other side of a corner between two legs tractions are singular as well.
+        ends = at_corner.get(name, ())
+        in_corners = {end.element for end in ends}
+        for end in ends:
+            # On the other side of a corner between two legs tractions are singular as well, and at the other end of a
+            # leg of two elements.
             beyond = end.element + (1 if end.at_start else -1)
-            inside = 0 <= beyond < len(own)
+            inside = 0 <= beyond < len(own) and beyond not in in_corners
             divisor = find_rise(beside, end.ratio, TRACTION_RATE) - 1
             rows.append((own[end.element], own[beyond] if inside else -1, divisor))
     table = np.array(rows, dtype=float).reshape(-1, 3)

@@ -9,8 +9,9 @@ The traces nearest to a place of the map (--at, parts of its extent) are importe
 A line for each size of elements: pairs, blocks, pairs whose status differs between the operators, and their largest
 difference of slip over the largest slip; the same for the case in which pieces that enclose blocks are interfaces of
 regions and the others remain cracks, with the length of the faces whose status differs over that of all. Slips are
-compared within the elements, by their own shape functions. With --accuracy the elements of these two are refined, each
-for itself, until that is met: both are off by what their meshes lack, so only then does the difference say anything.
+compared within the elements, by their own shape functions, beside tips with the root of the distance. With --accuracy
+the elements of these two are refined, each for itself, until that is met: both are off by what their meshes lack, so
+only then does the difference say anything.
 """
 
 from __future__ import annotations
@@ -155,8 +156,22 @@ def compare_operators(tables: dict[str, Any], folder: Path) -> None:
           f"{int(dense.steps.iterations.sum())}, {int(far.steps.iterations.sum())}", flush=True)
 
 
-def interpolate(at: Real, values: Real, places: Real, order: int) -> Real:
-    """Values at places (p,) from those at the nodes (k,) of elements, one after the other, of so many nodes each."""
+def interpolate(
+    at: Real, values: Real, places: Real, order: int, length: float = 0.0, tips: tuple[bool, bool] = (False, False)
+) -> Real:
+    """Values at places (p,) from those at the nodes (k,) of elements, one after the other, of order + 1 nodes each.
+
+    tips: whether the piece, of that length, begins and ends at the tip of a crack: there they follow the root of the
+    distance.
+    """
+    if any(tips):
+        nodes, result = order + 1, interpolate(at, values, places, order)
+        for tip, begin in ((0.0, 0),) * tips[0] + ((length, len(at) - nodes),) * tips[1]:
+            own = at[begin : begin + nodes]
+            here = np.searchsorted(0.5 * (at[order:-1:nodes] + at[nodes::nodes]), places) == begin // nodes
+            root = values[begin : begin + nodes] / np.sqrt(np.abs(own - tip))
+            result[here] = interpolate(own, root, places[here], order) * np.sqrt(np.abs(places[here] - tip))
+        return result
     nodes = order + 1
     last, first = at[order:-1:nodes], at[nodes::nodes]
     element = np.searchsorted(0.5 * (last + first), places)
@@ -170,10 +185,17 @@ def interpolate(at: Real, values: Real, places: Real, order: int) -> Real:
 
 def compare_regions(cracks: dict[str, Any], regions: dict[str, Any], folder: Path) -> None:
     """Print a line."""
-    operator, order = "auto" if "accuracy" in cracks["analysis"] else "dense", int(cracks["analysis"]["order"])
+    operator = "auto" if "accuracy" in cracks["analysis"] else "dense"
     one, other = (run(each, folder, name, operator) for each, name in ((cracks, "cracks"), (regions, "regions")))
-    if one is None:
-        return
+    if one is not None:
+        compare_slips(cracks, one, other)
+
+
+def compare_slips(cracks: dict[str, Any], one: Any, other: Any) -> None:
+    """Print a line on the results of a case of cracks, and of the same with regions."""
+    order = int(cracks["analysis"]["order"])
+    ends = [tuple(table["points"][end]) for table in cracks["curves"].values() for end in (0, -1)]
+    meeting = {end: ends.count(end) for end in ends}
     largest = max(float(np.abs(each.slip[-1]).max()) for each in one.contact.values())
     worst, place, pairs, differing, whole = 0.0, "", 0, 0.0, 0.0
     for name, each in one.contact.items():
@@ -188,7 +210,8 @@ def compare_regions(cracks: dict[str, Any], regions: dict[str, Any], folder: Pat
         corners = np.cumsum(np.abs(np.diff(np.array(cracks["curves"][name]["points"]) @ [1, 1j])), dtype=float)
         apart = np.abs(mine[:, None] - [0.0, *corners]).min(axis=1)
         within = (mine >= at[0]) & (mine <= at[-1]) & (apart >= AWAY * corners[-1])
-        off = np.where(within, np.abs(interpolate(at, slip, mine, order) - own), 0.0)
+        tips = tuple(meeting[tuple(cracks["curves"][name]["points"][end])] == 1 for end in (0, -1))
+        off = np.where(within, np.abs(interpolate(at, slip, mine, order, float(corners[-1]), tips) - own), 0.0)
         if off.max() > worst:
             worst, place = float(off.max()), f"{name} at {mine[off.argmax()]:.3g} of {mine[-1]:.3g}"
         weights = np.gradient(mine) if len(mine) > 1 else np.ones(1)

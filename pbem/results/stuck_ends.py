@@ -1,5 +1,5 @@
-"""Interfaces that stick all along, at whose ends the faces would slip or part on finer meshes: no difference from a
-second solution tells of that, as it sticks as well."""
+"""Interfaces that stick but for a few pairs, at whose ends the faces would slip or part on finer meshes: no difference
+from a second solution tells of that, as it sticks as well, or slips as little."""
 
 from __future__ import annotations
 
@@ -27,6 +27,9 @@ SHORTEST = 1e-6
 # the first end, and not of the other one. Tractions of single pairs are off next to the end on all meshes: of a block
 # with a friction of 0.45, which slips there, what grows has 0.63 to 0.87 of the bound by pairs, 1.14 to 1.38 by means.
 ENOUGH = 4
+# Pairs that move, as many as so many elements have, of at least so many times as many, are few: the others bear nearly
+# what they would without (tests/verification/test_stuck_ends.py).
+MOVING, REST = 2, 3
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class Ends:
 
 
 class StuckEnds:
-    """Looks at the ends of interfaces all of whose pairs stick; on one rank.
+    """Looks at the ends of interfaces of whose pairs all, or all but a few, stick; on one rank.
 
     Not of those that are bonded, have a tensile strength or give way elastically, nor at ends in narrow wedges whose
     pairs take the status of others.
@@ -96,16 +99,21 @@ class StuckEnds:
             at = length / np.e, np.exp((more * np.log(more) - length * np.log(length)) / (more - length) - 1)
             means = whole[:, one] / length, whole[:, other] / (more - length)
             jumps[:, known] = _measure_jumps(*means, *at)
-        np.maximum.at(least, ends.near, (jumps / ends.modulus).T)
+        # Of pairs that move what they have moved is there already.
+        moved = np.abs(np.stack([contact.opening - self._laws.gap, contact.slip]))
+        nearest = np.maximum(moved[:, ends.near], moved[:, ends.beyond])
+        np.maximum.at(least, ends.near, np.maximum(jumps / ends.modulus - nearest, 0.0).T)
         return least
 
     def _find_sticking(self, step: Step) -> Bool:
-        """The pairs (m,) of interfaces that are there, with no other status."""
+        """The pairs (m,) of interfaces that are there, of which all but a few have no other status."""
         contact, joints = step.contact, self._model.stages[step.stage].construction.joints
         sticking = np.zeros(self._mesh.pairs.count, dtype=bool)
         for name, own in self._interfaces.items():
             known = np.isfinite(contact.traction_n[own]).all() and np.isfinite(contact.slip[own]).all()
-            sticking[own] = name not in joints and known and (contact.mode[own] == STICK).all()
+            moving = np.count_nonzero(contact.mode[own] != STICK)
+            few = moving <= min(MOVING * (self._mesh.order + 1), len(own) // REST)
+            sticking[own] = name not in joints and known and few
         return sticking
 
 

@@ -21,6 +21,7 @@ from pbem.bem.group_sizes import (
     join_elements,
 )
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.strips import run_side_by_side
 
 # Unknowns that are left of a node of a body, and as a rule of one of a crack: its traction is eliminated.
 LEFT, LEFT_OF_CRACK = 2.0, 1.2
@@ -77,8 +78,9 @@ def _list_sizes(mesh: Mesh) -> Integer:
 
 
 def count_settling(mesh: Mesh) -> float:
-    """Numbers of four bytes that the parts of a network of cracks keep of their stiffness; none of another model."""
-    if not (mesh.crack.all() and do_cracks_meet(mesh)):
+    """Numbers of four bytes that the parts of a network of cracks keep of their stiffness, or of cracks side by side;
+    none of another model."""
+    if not (mesh.crack.all() and (do_cracks_meet(mesh) or run_side_by_side(mesh))):
         return 0.0
     elements = USUAL_PART * PART_ELEMENTS
     return mesh.elements / elements * (2 * (mesh.order + 1) * (1 + PART_SHARE) * elements) ** 2

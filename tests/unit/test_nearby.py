@@ -14,6 +14,7 @@ from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.modes import Linearisation
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.numbering import list_nodes, number_components
+from pbem.mesh.strips import run_side_by_side
 from pbem.parallel import world
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.problem import Problem
@@ -178,3 +179,27 @@ def test_large_groups_are_exact_in_what_is_not_eliminated(many_groups: None) -> 
         # Stored in single precision.
         np.testing.assert_allclose(found[inverse.own][kept], expected[at][kept], rtol=0, atol=1e-5 * size)
     tangent.destroy()
+
+
+def make_pair(distance: float, length: float = 1.0, angle: float = 0.0) -> str:
+    turn = np.exp(1j * np.radians(angle))
+    above = [complex(0.0, distance), complex(length, distance)]
+    points = [[[(z * turn).real, (z * turn).imag] for z in ends] for ends in ([0j, 1 + 0j], above)]
+    return f"""
+materials.rock = {{ young = 1e3, poisson = 0.25 }}
+regions.plane = {{ material = "rock", infinite = true, cracks = ["lower", "upper"] }}
+curves.lower = {{ points = {points[0]}, elements = 8 }}
+curves.upper = {{ points = {points[1]}, elements = 8 }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("distance", "length", "side_by_side"),
+    [(0.01, 1.0, True), (0.01, -1.0, False), (0.1, 1.0, False), (0.01, 0.2, False)],
+)
+def test_cracks_run_side_by_side_where_the_strip_between_them_is_long_and_thin(
+    distance: float, length: float, side_by_side: bool
+) -> None:
+    for angle in (0.0, 37.0):
+        _, model = parse_model(make_pair(distance, length, angle))
+        assert run_side_by_side(generate_mesh(model)) is side_by_side

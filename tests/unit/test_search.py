@@ -58,6 +58,17 @@ def test_neighbours_join_where_pairs_change_beside_groups_that_were_solved() -> 
     assert follow(search, [60]) == [[6, 7, 9, 10, 11, *range(12, 37), 60]]
 
 
+def test_fewer_neighbours_join_where_all_of_them_are_too_many() -> None:
+    search = Search(30, np.zeros(COUNT, dtype=np.int64))
+    found = Settled(make_modes(SLIP, count=COUNT), False, 0, np.zeros(0, dtype=bool))
+    assert follow(search, [50], [50], [50], [50])[-1] == [50]
+    search.conclude(found)
+    assert follow(search, [50]) == [list(range(46, 55))]
+    search.conclude(found)
+    # Sixteen on either side are more than thirty: four.
+    assert follow(search, [55]) == [list(range(46, 60))]
+
+
 def test_large_groups_that_failed_are_tried_again_after_more_and_more_iterations() -> None:
     search = Search(90)
     failed = Settled(None, False, 1, np.zeros(0, dtype=bool))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pbem.contact.laws import OPEN
 from pbem.exact import arc_crack_intensity, collinear_cracks_intensity
 from tests.verification.proofs.proof import Solved, line, solve_case
 
@@ -98,6 +99,23 @@ def solve_parallel_cracks(distance: float, elements: int, remote: dict[str, floa
 def test_the_factors_of_parallel_cracks(distance: float, remote: dict[str, float]) -> None:
     coarse, fine = (np.array(solve_parallel_cracks(distance, count, remote)) for count in (8, 120))
     assert np.abs(coarse - fine).max() < 0.01 * np.abs(fine).max()
+
+
+@pytest.mark.parametrize(("distance", "operator"), [(0.0028, "dense"), (0.004, "hierarchical")])
+def test_the_strip_between_parallel_cracks_touches_where_it_bends(distance: float, operator: str) -> None:
+    """In a twentieth of its length: the search lifts it elsewhere, and not pair by pair."""
+    cracks = {"low": line(-0.5 + 0j, 0.5 + 0j, 8), "high": line(-0.5 + 1j * distance, 0.5 + 1j * distance, 8)}
+    solved = solve_case(
+        materials={"rock": ROCK}, curves=cracks, remote={"sxx": 0.3, "syy": 1.0, "sxy": -0.4},
+        interfaces={name: {"law": "frictionless"} for name in cracks},
+        regions={"plane": {"material": "rock", "infinite": True, "cracks": list(cracks)}},
+        analysis={"steps": 1}, solver={"operator": operator, "newton_max_iterations": 20, "min_step": 1.0},
+    )
+    touching = np.mean(solved.last.contact.mode != OPEN)
+    assert 0.02 < touching < 0.1
+    # From far away the two are one open crack: what both release at an end is what that one would.
+    released = sum(np.square(solved.factors(name)).sum(axis=0) for name in cracks)
+    np.testing.assert_allclose(released, np.pi / 2 * (1.0 + 0.4**2), rtol=0.01)
 
 
 def solve_cracks(cracks: dict[str, Any], law: dict[str, Any], remote: dict[str, float], order: int = 2) -> Solved:

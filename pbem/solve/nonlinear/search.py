@@ -31,6 +31,7 @@ from pbem.contact.modes import Frozen, Proposal
 from pbem.contact.pivoting import OperationCount
 from pbem.contact.subset import Settled
 from pbem.solve.nonlinear.forcing import Forcing
+from pbem.solve.nonlinear.neighbours import find_neighbours, list_reaches
 from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
@@ -276,21 +277,14 @@ class Search:
         most = self.most_pivoted if not self.is_stuck() else max(self.most_pivoted, MOST_IF_STUCK)
         lately = np.unique(np.concatenate(self.changed[-2:]))
         whole = np.union1d(self.group, lately)
-        for group in (np.union1d(whole, self._find_neighbours(self.changed[-1])), whole, lately, self.changed[-1]):
+        reaches = [] if self.interface is None else list_reaches(self.solved, most)
+        beside = (np.union1d(each, find_neighbours(self.changed[-1], reach, self.interface, self.excluded))
+                  for reach in reaches for each in (whole, lately) if self.interface is not None)
+        for group in (*beside, whole, lately, self.changed[-1]):
             if len(group) <= most:
                 self.group = group
                 return group
         return nothing
-
-    def _find_neighbours(self, pairs: Integer) -> Integer:
-        """The pairs next to some, the more the oftener groups were solved in turn: contact ends somewhere there."""
-        if self.interface is None or not self.solved:
-            return pairs
-        reach = min(4**self.solved, len(self.interface))
-        near = pairs[:, None] + np.arange(-reach, reach + 1)
-        inside = np.clip(near, 0, len(self.interface) - 1)
-        near = inside[(near == inside) & (self.interface[inside] == self.interface[pairs][:, None])]
-        return np.unique(near[~np.broadcast_to(self.excluded, self.interface.shape)[near]])
 
     def conclude(self, found: Settled) -> bool:
         """Take note of what pivoting found for the group; True if there seems to be nothing to be found.

@@ -26,6 +26,7 @@ from pbem.contact.modes import Linearisation, Proposal
 from pbem.contact.subset import Settled, settle_subset
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import number_components
+from pbem.mesh.strips import run_side_by_side
 from pbem.parallel import add_up
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import find_nearest
@@ -42,10 +43,11 @@ AROUND, LEAST_AROUND = 3, 60
 def answers_nearby(problem: Problem) -> bool:
     """Whether pairs of a problem with the hierarchical operator are answered for by what is near to them.
 
-    Cracks that meet, and whose bonds do not fail: of such failures the order matters.
+    Cracks that meet or run side by side, and whose bonds do not fail: of such failures the order matters.
     """
-    pairs = problem.mesh.pairs
-    return bool(pairs.crack.all() and not problem.laws.brittle.any() and do_cracks_meet(problem.mesh))
+    pairs, mesh = problem.mesh.pairs, problem.mesh
+    suits = bool(pairs.crack.all() and not problem.laws.brittle.any())
+    return suits and (do_cracks_meet(mesh) or run_side_by_side(mesh))
 
 
 def settle_parts(

@@ -11,12 +11,12 @@ import numpy as np
 from scipy.linalg import lapack
 
 from pbem.arrays import Integer, Real, Single
+from pbem.bem.group_sizes import do_cracks_meet
 from pbem.clock import clock
 from pbem.contact.modes import Linearisation
 from pbem.mesh.numbering import number_components
 from pbem.solve.problem.problem import Problem
 from pbem.solve.system.halo import place_unknowns
-from pbem.solve.tangent.nearby import answers_nearby
 from pbem.solve.tangent.sweeps import Parts
 
 
@@ -29,7 +29,7 @@ class PartInverses:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         # Nodes of outer boundaries have no part.
-        self._suit = bool(answers_nearby(problem) and problem.mesh.pairs.count == problem.mesh.nodes)
+        self._suit = bool(do_cracks_meet(problem.mesh) and problem.mesh.pairs.count == problem.mesh.nodes)
         self._parts: Parts | None = None
         self.beyond: Integer = np.zeros(0, dtype=np.int64)
         self.forget()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -265,3 +266,47 @@ def test_bodies_that_nothing_drives_lie_where_all_else_comes_to_rest(x: float, w
     # Where bodies are not to be laid down nothing is at rest.
     without = find_damped(problem, tangent, memory, load)
     assert without is not None and without.rest is None and without.runs is None
+
+
+TOWER = """
+materials.m = {{ young = 1e6, poisson = 0.2 }}
+curves.bed = {{ points = [[0, 0], [1, 0]], elements = 3 }}
+curves.side = {{ points = [[1, 0], [1, 1]], elements = 3 }}
+curves.right = {{ points = [[1, 1], [1, 1.25]], elements = 2 }}
+curves.top = {{ points = [[1, 1.25], [0, 1.25]], elements = 4 }}
+curves.left = {{ points = [[0, 1.25], [0, 0]], elements = 4 }}
+curves.ground = {{ points = [[0, 0], [-1, 0]], elements = 3 }}
+curves.rest = {{ points = [[-1, 0], [-1, -1], [3, -1], [3, 1]], elements = 12 }}
+curves.ledge = {{ points = [[3, 1], [1, 1]], elements = 4 }}
+regions.tower = {{ material = "m", boundary = ["bed", "side", "right", "top", "left"] }}
+regions.base = {{ material = "m", boundary = ["bed", "side", "ledge", "rest", "ground"] }}
+boundary = {{ rest = {{ ux = 0.0, uy = 0.0 }}, top = {{ tx = -{ratio}, ty = -1.0 }} }}
+interfaces.bed = {{ law = "coulomb", friction = 0.7, cohesion = {cohesion}, cohesion_lost = true }}
+interfaces.side = {{ law = "coulomb", friction = 0.7, cohesion = {cohesion}, cohesion_lost = true }}
+"""
+
+
+@pytest.mark.parametrize("cohesion", [1e2, 1e5])
+def test_a_tower_that_the_last_of_its_bonds_holds_topples(cohesion: float, tmp_path: Path) -> None:
+    """Faces bear no tension, so that it turns about its edge at a push of width / (2 height) = 0.4 of what presses it,
+    however strong the cohesion is; forces that no motion calls up, of a wall that it leaves, could balance more."""
+    (tmp_path / "stands.toml").write_text(TOWER.format(ratio=0.36, cohesion=cohesion))
+    assert open_results(run(tmp_path / "stands.toml", tmp_path / "stands.h5").path).steps.factor[-1] == 1.0
+    (tmp_path / "falls.toml").write_text(TOWER.format(ratio=0.44, cohesion=cohesion))
+    with pytest.raises(ConvergenceError) as error:
+        run(tmp_path / "falls.toml", tmp_path / "falls.h5")
+    assert error.value.reason == "limit load"
+    assert "prevents a rotation" in error.value.detail and "of 'tower'" in error.value.detail
+
+
+
+def test_a_block_on_many_pairs_topples() -> None:
+    """As on few: with a limit of 300 pairs masonry that topples ended with "mode cycle" after 22 halvings."""
+    pushed_block = write_pushed_block(1.03, {"friction": 3.0})
+    text = re.sub(r"(joint = .*elements = )8(.*power = )3", r"\g<1>102\g<2>1", pushed_block)
+    problem, tangent, memory, pushed = begin(text)
+    assert problem.laws.count > 300
+    assert can_be_damped(problem, tangent)
+    found = find_damped(problem, tangent, memory, pushed)
+    assert found is not None and found.rest is None and found.runs is not None
+    assert "rotation" in describe_run(problem, memory, pushed, found.runs).detail

@@ -37,7 +37,7 @@ from pbem.solve.problem.response import find_response
 from pbem.solve.problem.tangent import TangentOperator
 
 # Larger models are not asked: pivoting takes a time that grows with the cube of the number of pairs, and more.
-MOST_PAIRS = 300
+MOST_PAIRS = 400
 
 
 def can_be_damped(problem: Problem, tangent: TangentOperator) -> bool:

@@ -16,6 +16,7 @@ from pbem.contact.pivoting import OperationCount
 from pbem.contact.subset import Settled, settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
+from pbem.solve.nonlinear.damped import can_be_damped, rest_late
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.judging import make_judge
 from pbem.solve.nonlinear.search import Search
@@ -113,10 +114,32 @@ def pivot_group(
         return pivot_group(hold, tangent, constraints, modes, memory, load, law, solved, search)
     # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
     if ends and not broadcast(problem.comm, len(hold.pairs)):
-        raise end_search(hold, "no admissible modes", modes, search.proposal, search)
+        resting = _rest_without_bonds(hold, tangent, memory, load, search)
+        if resting is None:
+            raise end_search(hold, "no admissible modes", modes, search.proposal, search)
+        return resting
     if found.modes is None:
         return None
     settled = complete(found.modes)
     if tangent.settling.nearby and settled.fingerprint() == modes.fingerprint():
         return None  # what is near says otherwise than the whole model did
     return settled
+
+
+def _rest_without_bonds(
+    hold: Hold, tangent: TangentOperator, memory: Memory, load: Load, search: Search
+) -> ModeState | None:
+    """The modes in which bodies come to rest after bonds have failed in this step; None if they do not, or none has.
+
+    A body that the last of its bonds holds turns about it: modes that free it are none of its group, and no others are
+    found. Then the search is told that it moves on. Asked once in a search.
+    """
+    lost = broadcast(hold.problem.comm, bool((memory.broken & ~hold.memory.broken).any()))
+    if not lost or search.bondless or not can_be_damped(hold.problem, tangent):
+        return None
+    search.bondless = True
+    rest = rest_late(hold.problem, tangent, memory, load, search, hold.rested)
+    if rest is None:
+        return None
+    search.futile = 0
+    return follow_leaders(hold.problem.laws, rest.modes)

@@ -141,7 +141,8 @@ class Search:
         self.futile = self.solved = self.pause = self.paused = 0
         self.widened, self.widening, self.narrow = 0, False, self.group
         self.collapse = ""  # what moves on, where contacts do not come to rest against dashpots
-        self.restless = False  # whether they were asked, and neither that nor a state of rest was found
+        # Whether they were asked and neither was found, and whether they were asked without bonds that had failed.
+        self.restless = self.bondless = False
         self.level, self.sweeping = 0, self.sweeps
         self.returned = self.just_returned = False
         self.near, self.error, self.entered = NEAR, np.inf, 0

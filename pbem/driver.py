@@ -153,7 +153,7 @@ def _refine_and_solve(
     one = Pass(1, 0)
     if target.resume:
         read = do_on_first(watch.comm, PbemError, lambda: read_refinement(target.path))
-        model, one = (model, one) if read is None else (recall_mesh(model, read.fractions), read.one)
+        model, one = (model, one) if read is None else (recall_mesh(model, read.fractions, read.finished), read.one)
     notes: Sequence[str] = (*model.notes, *find_smooth(model))
     # Passes for an accuracy count as graded ones, but never are both asked for.
     first, tries, begun, graded = model, 0, one.number, one.number - 1

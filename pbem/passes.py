@@ -145,11 +145,20 @@ def _list_places(model: Model, places: Sequence[complex]) -> str:
     return named + (f" and {count(more, 'more place')}" if more > 0 else "")
 
 
-def recall_mesh(model: Model, fractions: Fractions) -> Model:
+def recall_mesh(model: Model, fractions: Fractions, finished: int) -> Model:
     """The model with the element ends of a file that is gone on with; as it is if that is of other curves, which is
-    told where all of both is compared."""
+    told where all of both is compared. finished: of how many stages the file holds all; a note says where more were
+    added that these ends were chosen without them."""
+    added = model.analysis.accuracy is None and 0 < finished < len(model.stages)
+    of = "the first stage" if finished == 1 else f"the first {finished} stages"
+    note = (
+        f"Elements that were refined where contacts ended, or did not settle, at the end of {of} are kept for those "
+        "that were added; a run of all stages refines them where contacts end at its end. Results differ by about the "
+        "estimated errors: --force computes all stages anew."
+    )
     try:
-        return replace(impose_fractions(model, fractions), refined=model.analysis.accuracy is None)
+        return replace(impose_fractions(model, fractions), refined=model.analysis.accuracy is None,
+                       notes=(*model.notes, note) if added else model.notes)
     except ValueError:
         return model
 

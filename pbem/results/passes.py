@@ -25,10 +25,14 @@ from pbem.results.writer import ResultWriter
 
 @dataclass(frozen=True)
 class Refinement:
-    """Where a result file that is to be gone on with stands: the element ends of its mesh, and its pass."""
+    """Where a result file that is to be gone on with stands: the element ends of its mesh, and its pass.
+
+    finished: the number of its stages, if it holds all of their steps; 0 if it does not.
+    """
 
     fractions: Fractions
     one: Pass
+    finished: int = 0
 
 
 def read_refinement(path: Path) -> Refinement | None:
@@ -44,7 +48,9 @@ def read_refinement(path: Path) -> Refinement | None:
             if fractions is None:
                 return None
             attributes = file["mesh"].attrs  # files of earlier versions do not say
-            return Refinement(fractions, Pass(int(attributes.get("pass", 1)), int(attributes.get("first_unknowns", 0))))
+            one = Pass(int(attributes.get("pass", 1)), int(attributes.get("first_unknowns", 0)))
+            whole, k = file.attrs.get("status") == "finished" and not file.attrs.get(MAY_FOLLOW), count_steps(file)
+            return Refinement(fractions, one, int(file["steps/stage"][k - 1]) + 1 if whole and k else 0)
     except (OSError, KeyError, ValueError) as error:
         raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
 

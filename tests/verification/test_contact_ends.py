@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -201,6 +202,25 @@ def test_a_finished_run_is_left_as_it_is(tmp_path: Path, monkeypatch: pytest.Mon
     assert results.fractions is not None
     again = path.read_bytes()
     assert pbem.run(case, path, resume=True).status == "finished" and path.read_bytes() == again
+
+
+@pytest.mark.parametrize("graded", [True, False])
+def test_stages_that_are_added_say_that_they_keep_the_mesh(graded: bool, tmp_path: Path) -> None:
+    """Contact that was graded towards its ends under one force ends elsewhere under the next one."""
+    table = tomllib.loads(write_pin(1e-3, FORCE, 20.0, 32, hub=0.002, edge=300.0, grade_contact_ends=graded))
+    del table["analysis"]["steps"]
+    push = table["boundary"]["hub"]["rigid"]
+    stages = [{"name": name, "steps": 1, "boundary": {"hub": {"rigid": {**push, "fx": part * push["fx"]}}}}
+              for name, part in (("first", 1.0), ("second", 1.3))]
+    said = "are kept for those that were added"
+    path = tmp_path / "pin.h5"
+    results = pbem.run({**table, "stages": stages[:1]}, path)
+    assert (results.fractions is not None) == graded and said not in "".join(results.notes)
+    both = {**table, "stages": stages}
+    added = pbem.run(both, path, resume=True)
+    assert len(added.steps.factor) == 2
+    assert (said in "".join(added.notes)) == graded
+    assert said not in "".join(pbem.run(both, path, force=True).notes)
 
 
 def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(

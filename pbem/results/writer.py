@@ -19,7 +19,7 @@ from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.balance import append_balance
-from pbem.results.coverage import describe_sparse_contacts
+from pbem.results.coverage import Coverage
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.former import read_former, write_former
 from pbem.results.hoop_stress import HoopStress
@@ -158,7 +158,7 @@ class ResultWriter:
         self._every = max(1, model.output_every)
         self._pairs = join_pairs(sort_pairs(mesh))
         self.tip_rules = collect_tip_rules(model, mesh)
-        self._balance = EnergyBalance(model, mesh, last_step, reached)
+        self._balance, self._coverage = EnergyBalance(model, mesh, last_step, reached), Coverage(model, mesh)
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
         self._hoop_stress = HoopStress(model, mesh)
         self._absence = Absence(model, mesh, points)
@@ -198,9 +198,7 @@ class ResultWriter:
         # What has to move before it touches is noted with the model.
         runaway = None if self._model.closing and step.number == 1 else self._balance.runaway
         notes = [] if runaway is None else [describe_runaway(step, runaway)]
-        if step.last_of_stage and step.stage == len(self._model.stages) - 1:
-            notes += describe_sparse_contacts(self._model, self._mesh, step.contact.mode)
-        return tuple(notes)
+        return (*notes, *self._coverage.follow(step))
 
     def _commit(self, what: str) -> None:
         try:

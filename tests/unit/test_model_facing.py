@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import cmath
 import math
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,9 +13,12 @@ import pytest
 from pbem.geometry.curve import Leg
 from pbem.mesh.equations import choose_equations
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
 from pbem.model.rigid_body_modes import find_rigid_body_modes
 from pbem.model.sight import Obstacles
-from pbem.results.coverage import describe_sparse_contacts
+from pbem.results.coverage import Coverage
+from pbem.solve.problem.step import Step
 from tests.unit.case_sample import MATERIAL, SQUARE, add_curves, build, change, find_only_fault
 
 SCALES = [(1.0, 0.0, 0j), (1e-6, 0.3, 0j), (1e6, 1.2, 5e6 - 2e6j)]
@@ -191,19 +196,52 @@ def test_tension_beyond_the_apex_is_refused(rest: str) -> None:
     assert build(square + smooth).interfaces["crack"].law.tensile_strength == 5.0
 
 
+def see(model: Model, mesh: Mesh, *closed: int, moved: float = 0.0) -> tuple[str, ...]:
+    """What a run says in whose steps so many pairs are closed; moved: the largest displacement."""
+    coverage, said = Coverage(model, mesh), list[tuple[str, ...]]()
+    for number, pairs in enumerate(closed, 1):
+        mode = np.where(np.arange(mesh.pairs.count) < pairs, 0, 2).astype(np.int8)
+        contact = SimpleNamespace(mode=mode, traction_n=np.where(mode == 2, 0.0, -1.0))
+        step = SimpleNamespace(number=number, stage=0, last_of_stage=number == len(closed), contact=contact,
+                               displacement=np.array([moved + 0j]))
+        said.append(coverage.follow(cast(Step, step)))
+    assert not any(said[:-1])
+    return said[-1]
+
+
 def test_contacts_on_few_elements_are_noted() -> None:
     model = build(write_blocks("top", "foot", 0.0))
     mesh = generate_mesh(model)
-    mode = np.full(mesh.pairs.count, 2, dtype=np.int8)
-    assert describe_sparse_contacts(model, mesh, mode) == ()
-    mode[:8] = 0
-    (note,) = describe_sparse_contacts(model, mesh, mode)
+    assert see(model, mesh, 0) == ()
+    (note,) = see(model, mesh, 8)
     assert "'seat' is closed on 3 of its 7 elements" in note
-    mode[:] = 1
-    assert describe_sparse_contacts(model, mesh, mode) == ()
+    assert see(model, mesh, 21) == ()
+    # Steps before the last one count as well.
+    (note,) = see(model, mesh, 21, 11, 8, 21)
+    assert "'seat' is closed in step 3 on 3 of its 7 elements and in 1 more step on fewer than 5" in note
+    (note,) = see(model, mesh, 5, 21, 8)
+    assert "'seat' is closed on 3 of its 7 elements" in note
+    # A body that lies there and carries nothing beside displacements.
+    assert see(model, mesh, 8, moved=1e12) == ()
     few = change(write_blocks("top", "foot", 0.0), ("elements = 7", "elements = 3"))
     (note,) = [note for note in generate_mesh(build(few)).notes if "seat" in note]
     assert "3 elements" in note
+
+
+@pytest.mark.parametrize(("law", "noted"), [
+    ("{ law = 'coulomb', friction = 0.5 }", True), ("{ law = 'coulomb', friction = 0.5, cohesion = 1.0 }", True),
+    ("{ law = 'bonded' }", False),
+])  # fmt: skip
+def test_faces_of_two_bodies_that_part_are_noted_as_contacts_are(law: str, noted: bool) -> None:
+    """Also without a gap; faces of a crack lie in one body."""
+    points = {"east": "[[2, 2], [2, 3]]", "roof": "[[2, 3], [0, 3]]", "west": "[[0, 3], [0, 2]]"}
+    more = "\n".join(f"{name} = {{ points = {at}, elements = 8 }}" for name, at in points.items())
+    both = add_curves(SQUARE.replace("[boundary.top]", "[boundary.roof]"), more)
+    upper = '[regions.upper]\nmaterial = "soft"\nboundary = ["top", "east", "roof", "west"]\n'
+    model = build(f"{both}\n{upper}[interfaces]\ntop = {law}\n")
+    assert bool(see(model, generate_mesh(model), 4)) == noted
+    cracked = build(add_curves(SQUARE, "crack = { points = [[0.5, 1], [1.5, 1]], elements = 8 }", 'cracks = ["crack"]'))
+    assert see(cracked, generate_mesh(cracked), 4) == ()
 
 
 @pytest.mark.parametrize("mirror", [1.0, -1.0])

@@ -478,7 +478,7 @@ def test_a_listener_that_fails_after_a_step_was_stored_does_not_have_it_stored_a
 
     case = write_small(tmp_path / "pin.toml")
     monkeypatch.setattr(driver, "plan_graded", lambda *_: None)
-    monkeypatch.setattr(writer_module, "describe_sparse_contacts", lambda *_: ["sparse"])
+    monkeypatch.setattr(writer_module.Coverage, "follow", lambda _, step: ("sparse",) * (step.number == 2))
     with pytest.raises(RuntimeError, match="no room to tell it"):
         pbem.run(case, tmp_path / "pin.h5", reporter=Failing())
     kept = pbem.open_results(tmp_path / "pin.h5")

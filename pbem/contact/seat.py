@@ -18,12 +18,14 @@ from pbem.contact.closure import find_closure, measure_closure_error
 from pbem.contact.declaration import Dilation, Slide
 from pbem.contact.dilating import DILATION
 from pbem.contact.laws import (
+    OPEN,
     SLIP,
     STICK,
     Memory,
     ModeState,
     PairLaws,
     PairState,
+    evaluate_strength,
     find_effective,
     plastic_slip,
     slip_ahead,
@@ -73,6 +75,18 @@ def measure_clearance(laws: PairLaws, memory: Memory, state: PairState, pressure
     slide = memory.look_ahead(np.abs(plastic_slip(laws, state) - memory.slip))
     added = np.where(adheres, 0.0, evaluate_dilation(laws, state.p_n, slide, pressure).opening)
     return state.g_n - find_closure(laws, state.p_n, pressure)[0] - read_dilation(laws, memory.internal) - added
+
+
+def find_unlifted(laws: PairLaws, modes: ModeState, memory: Memory, state: PairState, pressure: Real) -> Bool:
+    """The open pairs (m,) of a solution that are nearer than their slip in this step would have pushed them apart, had
+    they stayed closed: of those that adhere (see `measure_clearance`), so that closed ones may be a solution as well.
+    """
+    if not any(group.law.dilates for group in laws.strengths):
+        return np.zeros(laws.count, dtype=bool)
+    slide = memory.look_ahead(np.zeros(laws.count))
+    adheres = evaluate_strength(laws, np.minimum(0.0, -pressure), slide, pressure).bound > 0
+    clear = measure_clearance(laws, memory, state, pressure, np.zeros_like(adheres))
+    return (modes.mode == OPEN) & ~laws.parted & adheres & (clear < 0)
 
 
 @dataclass(frozen=True)

@@ -275,6 +275,25 @@ def test_fluid_takes_part_where_it_is(inside: bool, tmp_path: Path) -> None:
     assert np.abs(left).max() < 1e-8 * np.abs(energy.external).max() and not energy.released.any()
 
 
+@pytest.mark.parametrize(("history", "noted"), [((True,), True), ((False, True), False)])
+def test_two_states_under_a_fluid_are_noted(history: tuple[bool, ...], noted: bool, tmp_path: Path) -> None:
+    """A crack that a fluid opens from rest, or that has slid before and stays closed under the same loads: uniform
+    drops of tractions, pressure - fluid and the whole shear, or those of friction."""
+    pressure, tau, fluid = 2.0, 3.0, 2.1
+    drop = (tau - FRICTION * pressure) / (1 + FRICTION * CLIMB)
+    assert pressure + CLIMB * drop > fluid > pressure
+    case = make_crack(1.0, pressure, tau)
+    remote = case.pop("remote")
+    case["stages"] = [{"name": f"s{k}", "steps": 1, "remote": remote,
+                       "interfaces": {"crack": {"pressure": fluid if acts else 0.0}}} for k, acts in enumerate(history)]
+    results = pbem.run(case, tmp_path / "crack.h5")
+    tips = results.tips["crack"]
+    opened, slid = (fluid - pressure, tau) if noted else (CLIMB * drop, drop)
+    np.testing.assert_allclose(tips.KI[-1], opened * math.sqrt(math.pi), rtol=1e-6)
+    np.testing.assert_allclose(np.abs(tips.KII[-1]), slid * math.sqrt(math.pi), rtol=1e-6)
+    assert ("may be in equilibrium as well" in "".join(results.notes)) == noted
+
+
 @pytest.mark.parametrize(
     ("angle", "find"),
     [({"expression": "18 + 8*x"}, lambda x, s: 18 + 8 * x),

@@ -35,7 +35,7 @@ from pbem.solve.steps.ends import (
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.steps.softly import solve_softly
-from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing, note_pushed
+from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing, note_pushed, note_unlifted
 from pbem.solve.steps.values import refuse_without_value
 
 # After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
@@ -111,6 +111,7 @@ def march(
     noted, told = 0.0, 0.0
     pushed: Mapping[str, float] = {}
     passed: Mapping[tuple[str, str], float] = {}
+    unlifted: frozenset[str] = frozenset()
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
@@ -137,6 +138,7 @@ def march(
                 told = note_nonlinearity(problem, step, told, reporter)
                 passed = note_passing(problem, step, passed, reporter)
                 pushed = note_pushed(problem, step, pushed, reporter)
+                unlifted = note_unlifted(problem, solution, step, unlifted, reporter)
                 contact = step.contact
                 with note_place(step, solution.modes):
                     reporter.accept(step)

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pbem.contact.seat import find_unlifted
 from pbem.errors import ConvergenceError
 from pbem.geometry.tolerance import TIE
 from pbem.parallel import do_on_first
 from pbem.solve.nonlinear.imbalance import describe_imbalance
+from pbem.solve.nonlinear.newton import Solution
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Reporter, Step
 from pbem.solve.steps.closed_gaps import find_closed_gap
@@ -20,6 +22,8 @@ from pbem.solve.steps.passing import Passing, describe_passing, find_passing
 # What has grown by so much is noted again. Under proportional loads it doubles exactly from the first step to the
 # second and to the fourth: rounding must not choose.
 GROWN = 2 * (1 - TIE)
+# So many interfaces are named.
+MOST_NAMED = 5
 
 
 def note_imbalance(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
@@ -92,3 +96,25 @@ def note_pushed(problem: Problem, step: Step, noted: Mapping[str, float], report
     for text in describe_pushed(new):
         reporter.note(f"Step {step.number}: {text}.")
     return {**noted, **{each.name: each.depth for each in new}}
+
+
+def note_unlifted(
+    problem: Problem, solution: Solution, step: Step, noted: frozenset[str], reporter: Reporter
+) -> frozenset[str]:
+    """Note, once for each name, faces that have parted though their slip would have lifted them further: two states may
+    be in equilibrium; returns the names that are noted now."""
+    def find() -> list[str]:
+        found = find_unlifted(problem.laws, solution.modes, solution.memory, solution.pairs, solution.pressure)
+        numbers = np.unique(problem.mesh.pairs.interface[found])
+        return [problem.mesh.interface_names[number] for number in numbers]
+
+    new = [name for name in do_on_first(problem.comm, ConvergenceError, find) if name not in noted]
+    if new:
+        names = ", ".join(repr(name) for name in new[:MOST_NAMED])
+        more = f" and {len(new) - MOST_NAMED} more" if len(new) > MOST_NAMED else ""
+        reporter.note(
+            f"Step {step.number}: faces of {names}{more} are open, and nearer than their slip would have pushed them "
+            "apart by their dilation: closed, with the cohesion or the friction that they lost as they parted, they "
+            'may be in equilibrium as well. cohesion_lost = true, or with fluids pressurised = "all", leaves one state.'
+        )
+    return noted | {*new}

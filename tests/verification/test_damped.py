@@ -21,7 +21,7 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.system.assembly import assemble_problem
 from scripts.torture.kinds import KINDS
-from scripts.torture.runs import run_sample
+from scripts.torture.runs import Watch, run_sample
 from tests.verification.test_limit_load import write_pushed_block
 from tests.verification.test_settling import Listener
 
@@ -298,6 +298,21 @@ def test_a_tower_that_the_last_of_its_bonds_holds_topples(cohesion: float, tmp_p
     assert error.value.reason == "limit load"
     assert "prevents a rotation" in error.value.detail and "of 'tower'" in error.value.detail
 
+
+
+
+@pytest.mark.parametrize("distance", [1e-9, 1e-3])
+def test_a_tower_on_friction_that_weakens_topples_at_once(distance: float, tmp_path: Path) -> None:
+    """As its small steps are all alike from rest: the least one is tried after two others, not a dozen of halves."""
+    law = f'friction = 0.7, friction_dynamic = 0.6, slip_distance = {distance}'
+    text = TOWER.format(ratio=0.44, cohesion=1.0).replace("friction = 0.7, cohesion = 1.0, cohesion_lost = true", law)
+    assert text.count(law) == 2
+    (tmp_path / "falls.toml").write_text(text)
+    watch = Watch()
+    with pytest.raises(ConvergenceError) as error:
+        run(tmp_path / "falls.toml", tmp_path / "falls.h5", reporter=watch)
+    assert error.value.reason == "limit load"
+    assert watch.halved <= 2
 
 
 def test_a_block_on_many_pairs_topples() -> None:

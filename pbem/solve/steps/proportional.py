@@ -23,10 +23,11 @@ def is_proportional_at_last(problem: Problem, memory: Memory, stage: int, reache
     So it is as above with cohesion besides, which no traction reaches in the end: faces without tensile strength then
     either part or stick, and where no choice of these is admissible no smaller step finds one. Bonds with tensile
     strength hold in the end; those without are lost where they part, and what friction then does knows no stress.
+    Friction that weakens with slip has not yet done so, as slips get small beside the distance that this takes.
     """
     laws = problem.laws
     parts = ~(laws.bonded | laws.parted) & ~(laws.tensile_strength > 0)
-    plain = all(group.law.linear for group in laws.strengths if parts[group.pairs].any())
+    plain = all(group.law.pivots_at_slip for group in laws.strengths if parts[group.pairs].any())
     if laws.gap[parts].any() or not parts.any() or not plain:
         return False
     return _grows_from_rest(problem, memory, stage, reached)

@@ -36,7 +36,7 @@ def test_the_solution_is_that_of_the_true_laws(
 ) -> None:
     """From rest, and after a step that the pairs remember."""
     if way == "compliance":
-        monkeypatch.setattr(softly_module, "can_be_damped", lambda problem, tangent: False)
+        monkeypatch.setattr(softly_module, "can_be_damped", lambda *_: False)
     law = {"friction": 0.25, "cohesion": 0.01}
     model = parse_model(write_pushed_block(0.2, law, unit))[1]
     problem, listener = assemble_problem(model, generate_mesh(model), world), Listener()
@@ -102,7 +102,7 @@ def test_softer_contacts_are_tried_where_dashpots_cannot_tell_of_pairs_without_m
 ) -> None:
     """Dashpots where they can look for a state of rest, unless they have; softer contacts for want of them, if there is
     time."""
-    monkeypatch.setattr(softly_module, "can_be_damped", lambda problem, tangent: damps)
+    monkeypatch.setattr(softly_module, "can_be_damped", lambda *_: damps)
     model = parse_model(write_pushed_block(0.2, {"friction": 0.25, "cohesion": 0.01}))[1]
     problem, listener = assemble_problem(model, generate_mesh(model), world), Listener()
     tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)

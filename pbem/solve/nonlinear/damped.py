@@ -36,16 +36,19 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
 from pbem.solve.problem.tangent import TangentOperator
 
-# Larger models are not asked: pivoting takes a time that grows with the cube of the number of pairs, and more.
-MOST_PAIRS = 400
+# Larger models are not asked: pivoting takes a time that grows with the cube of the number of pairs, and more. Those
+# up to the second number are asked at last, where the largest load is near or bonds have failed: elsewhere shorter
+# elements may settle what moves on with these.
+MOST_PAIRS, MOST_AT_LAST = 300, 400
 
 
-def can_be_damped(problem: Problem, tangent: TangentOperator) -> bool:
-    """Whether `find_damped` can be asked: for laws whose contact can be pivoted, of models that are not too large."""
+def can_be_damped(problem: Problem, tangent: TangentOperator, most: int = MOST_PAIRS) -> bool:
+    """Whether `find_damped` can be asked: for laws whose contact can be pivoted, of models with so many pairs at most.
+    """
     laws = problem.laws
     pivots = (find_pivoting(laws) | find_running(laws)).all() and not laws.follows.any()
     some = find_changing(laws).any()
-    return bool(pivots and some) and laws.count <= MOST_PAIRS and not tangent.settling.nearby
+    return bool(pivots and some) and laws.count <= most and not tangent.settling.nearby
 
 
 def find_damped(

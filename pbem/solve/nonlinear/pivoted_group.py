@@ -16,7 +16,7 @@ from pbem.contact.pivoting import OperationCount
 from pbem.contact.subset import Settled, settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
-from pbem.solve.nonlinear.damped import can_be_damped, rest_late
+from pbem.solve.nonlinear.damped import MOST_AT_LAST, can_be_damped, rest_late
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.judging import make_judge
 from pbem.solve.nonlinear.search import Search
@@ -135,7 +135,7 @@ def _rest_without_bonds(
     found. Then the search is told that it moves on. Asked once in a search.
     """
     lost = broadcast(hold.problem.comm, bool((memory.broken & ~hold.memory.broken).any()))
-    if not lost or search.bondless or not can_be_damped(hold.problem, tangent):
+    if not lost or search.bondless or not can_be_damped(hold.problem, tangent, MOST_AT_LAST):
         return None
     search.bondless = True
     rest = rest_late(hold.problem, tangent, memory, load, search, hold.rested)

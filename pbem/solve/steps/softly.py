@@ -14,7 +14,7 @@ from pbem.contact.laws import Memory, find_linear
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError, StopError
 from pbem.solve.nonlinear.checkpoint import Plain, from_plain, to_plain
-from pbem.solve.nonlinear.damped import can_be_damped, describe_run, find_damped
+from pbem.solve.nonlinear.damped import MOST_AT_LAST, can_be_damped, describe_run, find_damped
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Iteration, Supervisor
@@ -33,7 +33,8 @@ def solve_softly(
     """A load step whose search has ended with an error, by statuses of other contacts; None if these do not settle.
 
     At first by those of contacts that come to rest against dashpots (see pbem.contact.damped), then by those of softer
-    contacts. The solution is one of the true laws, found by their own search. Its iterations are those of all contacts.
+    contacts; of larger models it is asked at last whether the bodies move on, where the largest load is near (hurried).
+    The solution is one of the true laws, found by their own search. Its iterations are those of all contacts.
     A truer error where the bodies do not come to rest. None, too, for crack networks and large models, whose groups
     settle by themselves, for laws that are not linear in each status, and for other errors. hurried: whether softer
     contacts are left out, as they are where pairs have no admissible modes among which dashpots can look for a state
@@ -53,9 +54,12 @@ def solve_softly(
             damped = {"contact": len(SOFTNESS), "modes": to_plain(rest.rest.modes), "iterations": to_plain([]),
                       "inner": None, "damped": True}
     found = _follow(problem, tangent, contacts, begin, load, reporter, damped) if damped else None
-    if hurried or (parts and damps):
+    if not (hurried or (parts and damps)):
+        found = found or _follow(problem, tangent, contacts, begin, load, reporter, None if damped else resumed)
+    if found or damps or not hurried or not can_be_damped(problem, tangent, MOST_AT_LAST):
         return found
-    return found or _follow(problem, tangent, contacts, begin, load, reporter, None if damped else resumed)
+    last = find_damped(problem, tangent, begin, load)
+    return describe_run(problem, begin, load, last.runs) if last and last.runs else None
 
 
 def _follow(

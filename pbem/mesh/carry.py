@@ -48,9 +48,9 @@ def _goes_forward(curve: Curve, start: complex, end: complex) -> bool:
     """Whether elements of a curve, of which the first one has these ends, go in its direction."""
     if not curve.closed and start in (curve.start, curve.end):
         return bool(start == curve.start)
-    # As `divide_curve` has the first of the curve's elements.
-    first = curve.legs[0].element_ends()[:2]
-    return bool(start == first[0] and end == first[1])
+    # The first element of a closed curve, or its last one travelled backwards, starts where the curve does.
+    after, before = curve.legs[0].element_ends()[1], curve.legs[-1].element_ends()[-2]
+    return bool(abs(end - after) <= abs(end - before))
 
 
 def carry_nodes(fine_model: Model, fine: Mesh, coarse_model: Model, coarse: Mesh) -> Carry:

@@ -1,30 +1,36 @@
-"""The elements that a curve is divided into."""
+"""The elements that curves are divided into."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pbem.arrays import Real
+from pbem.arrays import Integer, Real
 from pbem.geometry.curve import Curve
 from pbem.geometry.elements import Elements
 from pbem.mesh.shape_functions import integrate_shapes
 
 
-def divide_curve(curve: Curve) -> Elements:
-    """The elements of a curve in its own direction; neighbours share exactly the same point."""
-    fractions, ends = [leg.element_fractions() for leg in curve.legs], [leg.element_ends() for leg in curve.legs]
-    leg = np.repeat(np.arange(len(ends)), [len(points) - 1 for points in ends])
-    first, last = (np.concatenate([t[part] for t in fractions]) for part in (slice(None, -1), slice(1, None)))
-    pieces = Elements.collect(curve.legs).select(leg).cut(first, last)
-    start, end = (np.concatenate([points[part] for points in ends]) for part in (slice(None, -1), slice(1, None)))
-    return replace(pieces, start=start, end=end)
+def divide_curves(curves: Sequence[Curve]) -> Elements:
+    """The elements of some curves, one curve after the other, each in its own direction; neighbours share exactly the
+    same point. All are found at once: for thousands of short curves, one at a time takes five times as long."""
+    legs = [leg for curve in curves for leg in curve.legs]
+    fractions = [leg.element_fractions() for leg in legs]
+    counts = np.array([len(t) for t in fractions])
+    whole, t = Elements.collect(legs), np.concatenate(fractions)
+    points = whole.select(np.repeat(np.arange(len(legs)), counts)).place_fractions(t[:, None])[:, 0]
+    last = np.cumsum(counts) - 1
+    starts, ends = np.delete(np.arange(len(t)), last), np.delete(np.arange(len(t)), last - counts + 1)
+    pieces = whole.select(np.repeat(np.arange(len(legs)), counts - 1)).cut(t[starts], t[ends])
+    return replace(pieces, start=points[starts], end=points[ends])
 
 
-def count_elements(curve: Curve) -> list[int]:
-    """Of each of its legs."""
-    return [len(leg.element_fractions()) - 1 for leg in curve.legs]
+def number_legs(curve: Curve) -> Integer:
+    """The leg (elements,) that each of its elements lies on."""
+    counts = [leg.elements if leg.fractions is None else len(leg.fractions) - 1 for leg in curve.legs]
+    return np.repeat(np.arange(len(counts)), counts)
 
 
 def weigh_nodes(elements: Elements, local: Real) -> Real:

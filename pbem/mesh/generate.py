@@ -12,7 +12,7 @@ from pbem.geometry.carrier import NO_CARRIERS, find_carriers
 from pbem.geometry.elements import Elements
 from pbem.mesh.by_elements import form_by_elements
 from pbem.mesh.chain import Chain
-from pbem.mesh.elements import count_elements, divide_curve, weigh_nodes
+from pbem.mesh.elements import divide_curves, number_legs, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
 from pbem.mesh.mesh import Links, Mesh, Pairs
 from pbem.mesh.mortar_pairs import describe_sparse_meshes
@@ -20,6 +20,9 @@ from pbem.mesh.pairing import JOINED, pair_nodes
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 from pbem.model.model import Model, Region
 from pbem.uniform import fold_uniform, repeat_value
+
+# Elements whose nodes are placed at a time.
+PLACED = 4096
 
 
 def generate_mesh(model: Model) -> Mesh:
@@ -30,7 +33,8 @@ def generate_mesh(model: Model) -> Mesh:
     counts = [chain.elements.count for chain in chains]
     curve_names = tuple(model.curves)
     number = {name: at for at, name in enumerate(curve_names)}
-    position, normal, weight = _place_nodes(chains, order)
+    crack = np.repeat([chain.crack for chain in chains], counts)
+    position, normal, weight = _place_nodes(elements, crack, order)
     pairs, links = pair_nodes(model, chains, (position, normal, weight))
     faces_nothing = _find_free_elements(model, chains, pairs, links)
 
@@ -47,7 +51,7 @@ def generate_mesh(model: Model) -> Mesh:
         sweep=elements.sweep,
         region=repeat([chain.region for chain in chains], np.int64),
         curve=repeat([number[chain.curve] for chain in chains], np.int64),
-        crack=repeat([chain.crack for chain in chains], np.bool_),
+        crack=fold_uniform(crack),
         tip=fold_uniform(_mark_tips(model, chains)),
         position=position,
         normal=normal,
@@ -62,17 +66,19 @@ def generate_mesh(model: Model) -> Mesh:
     ))
 
 
-def _place_nodes(chains: Sequence[Chain], order: int) -> tuple[Complex, Complex, Real]:
-    """Positions, normals and weights of all nodes, chain by chain into arrays that are there: lists of those of each
-    chain would take their room twice over."""
-    count = sum(chain.elements.count for chain in chains) * (order + 1)
-    position, normal, weight = np.empty(count, dtype=complex), np.empty(count, dtype=complex), np.empty(count)
-    for chain in chains:
-        own = slice(chain.first_node, chain.first_node + chain.elements.count * (order + 1))
-        position[own] = chain.elements.place(chain.local).ravel()
-        normal[own] = chain.elements.normals(chain.local).ravel()
-        weight[own] = weigh_nodes(chain.elements, chain.local).ravel()
-    return position, normal, weight
+def _place_nodes(elements: Elements, crack: Bool, order: int) -> tuple[Complex, Complex, Real]:
+    """Positions, normals and weights of all nodes, some elements at a time into arrays that are there: what comes up on
+    the way would take their room several times over. crack (elements,): whether the nodes are those of cracks."""
+    shape = (elements.count, order + 1)
+    position, normal, weight = np.empty(shape, dtype=complex), np.empty(shape, dtype=complex), np.empty(shape)
+    for begin in range(0, elements.count, PLACED):
+        for local, wanted in ((place_nodes(order), False), (place_crack_nodes(order), True)):
+            own = begin + np.flatnonzero(crack[begin : begin + PLACED] == wanted)
+            if len(own):
+                some = elements.select(own)
+                position[own], normal[own], weight[own] = (
+                    some.place(local), some.normals(local), weigh_nodes(some, local))
+    return position.ravel(), normal.ravel(), weight.ravel()
 
 
 def _spread_equations(chains: Sequence[Chain], faces_nothing: Bool, order: int) -> Bool:
@@ -102,18 +108,11 @@ def _list_chains(model: Model, equations: Equations) -> tuple[Elements, list[Cha
     faces = _list_contact_faces(model)
     carriers = find_carriers({name: curve for name, curve in model.curves.items() if name in faces})
     sides = [(number, *side) for number, region in enumerate(model.regions) for side in _list_sides(region)]
-    parts: list[Elements] = []
-    joined: list[Elements] = []
-    for _, curve, forward, _ in sides:
-        own = divide_curve(model.curves[curve])
-        parts.append(own if forward else own.reverse())
-        if len(parts) == JOINED:
-            joined, parts = [*joined, Elements.join(parts)], []
-    elements = Elements.join([*joined, *parts]).fold()
+    elements = _divide_sides(model, [(curve, forward) for _, curve, forward, _ in sides]).fold()
     chains: list[Chain] = []
     first, per_element = 0, model.analysis.order + 1
     for number, curve, forward, crack in sides:
-        leg = np.repeat(np.arange(len(model.curves[curve].legs)), count_elements(model.curves[curve]))
+        leg = number_legs(model.curves[curve])
         # A crack always has the traction equation.
         traction = repeat_value(True, len(leg), bool) if crack else np.array(equations.traction[number, curve])
         if not forward:
@@ -124,6 +123,23 @@ def _list_chains(model: Model, equations: Equations) -> tuple[Elements, list[Cha
                             model.regions[number].rigid))
         first += len(leg)
     return elements, chains
+
+
+def _divide_sides(model: Model, sides: Sequence[tuple[str, bool]]) -> Elements:
+    """The elements of curves, one after the other, those of curves that are not travelled forward backwards.
+
+    A curve between two regions is divided once: its elements have to be the same for both, to the last bit.
+    """
+    curves = list(dict.fromkeys(curve for curve, _ in sides))
+    elements = Elements.join([divide_curves([model.curves[curve] for curve in curves[begin : begin + JOINED]])
+                              for begin in range(0, len(curves), JOINED)])
+    if len(curves) == len(sides) and all(forward for _, forward in sides):
+        return elements
+    counts = [len(number_legs(model.curves[curve])) for curve in curves]
+    own = dict(zip(curves, np.split(np.arange(elements.count), np.cumsum(counts)[:-1]), strict=True))
+    back = np.repeat([not forward for _, forward in sides], [len(own[curve]) for curve, _ in sides])
+    order = np.concatenate([own[curve][:: 1 if forward else -1] for curve, forward in sides])
+    return elements.select(order).turn_back(back)
 
 
 def _list_sides(region: Region) -> list[tuple[str, bool, bool]]:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
+from pbem.mesh import generate
+from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.interpolation import differentiate_at_nodes
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
@@ -124,6 +126,34 @@ def test_the_two_sides_of_an_interface_have_the_same_points(blocks: tuple[Model,
     np.testing.assert_allclose(mesh.normal[pairs.second[joint]], -pairs.normal[joint], atol=1e-15)
     np.testing.assert_allclose(first, pairs.position, rtol=0, atol=3e-16)
     assert len(set(pairs.first)) == pairs.count and len(set(pairs.second)) == pairs.count
+
+
+def test_elements_of_closed_curves_are_listed_in_their_direction(blocks: tuple[Model, Mesh]) -> None:
+    """Of a circle that two regions have, one travels it backwards."""
+    model, mesh = blocks
+    middle = 0.5 * (mesh.start + mesh.end)
+    found = [(name, own) for name, own in list_curve_elements(model, mesh) if name in ("rim", "hole")]
+    assert [name for name, _ in found] == ["rim", "hole", "rim"]
+    assert found[0][1][0] > found[0][1][-1] and found[2][1][0] < found[2][1][-1]
+    for name, own in found:
+        leg = model.curves[name].legs[0]
+        turned = np.angle((middle[own] - leg.center) / (leg.start - leg.center)) % (2 * np.pi)
+        assert np.all(np.diff(turned * np.sign(leg.sweep)) > 0)
+
+
+def test_curves_that_are_divided_at_once_have_the_elements_of_each(
+    blocks: tuple[Model, Mesh], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, mesh = blocks
+    monkeypatch.setattr(generate, "JOINED", 2)
+    monkeypatch.setattr(generate, "PLACED", 3)
+    other = generate_mesh(model)
+    for name in ("start", "end", "sweep", "position", "normal", "weight", "region", "curve"):
+        assert np.allclose(getattr(other, name), getattr(mesh, name), rtol=1e-15, atol=1e-15), name
+    for name, own in list_curve_elements(model, other):
+        ends = np.concatenate([leg.element_ends()[1 if number else 0 :]
+                               for number, leg in enumerate(model.curves[name].legs)])
+        np.testing.assert_allclose(other.start[own] + other.end[own], ends[:-1] + ends[1:], rtol=0, atol=1e-15)
 
 
 def test_pairs_follow_their_curve(blocks: tuple[Model, Mesh]) -> None:

@@ -130,7 +130,10 @@ def build_forest(start: Complex, end: Complex, bulge: Real, region: Integer, mos
         level, depth = following, depth + 1
     table = np.array(made, dtype=np.int64).reshape(-1, 5)
     owner, depths, above, first, last = np.ascontiguousarray(table.T)
-    center, radius = _enclose(order, first, last, start, end, middle, bulge)
+    center, radius = np.zeros(count, dtype=complex), np.zeros(count)
+    for depth in range(int(depths.max(initial=-1)) + 1):
+        own = np.flatnonzero(depths == depth)
+        center[own], radius[own] = _enclose(order, first[own], last[own], start, end, middle, bulge)
     children = np.bincount(above[above >= 0], minlength=count)
     child = np.full(count, -1)
     below = np.flatnonzero(above >= 0)[::-1]
@@ -161,17 +164,21 @@ def _cut(order: Integer, middle: Complex, first: int, last: int, twice: bool) ->
 def _enclose(
     order: Integer, first: Integer, last: Integer, start: Complex, end: Complex, middle: Complex, bulge: Real
 ) -> tuple[Complex, Real]:
-    """Centres and radii of circles around the clusters: about the middle of the box around the items' ends."""
-    center, radius = np.zeros(len(first), dtype=complex), np.zeros(len(first))
-    for k, (low, high) in enumerate(zip(first, last, strict=True)):
-        own = order[low:high]
-        ends = np.concatenate([start[own], end[own]])
-        x, y = ends.real, ends.imag
-        center[k] = 0.5 * (x.min() + x.max()) + 0.5j * (y.min() + y.max())
-        radius[k] = np.abs(ends - center[k]).max()
-        if bulge[own].any():
-            radius[k] = max(radius[k], float((np.abs(middle[own] - center[k]) + bulge[own]).max()))
-    return center, radius
+    """Centres and radii of circles around some clusters (k,), none of them empty: about the middle of the box around the
+    items' ends. All of a level at once: there are thousands of few items each."""
+    counts = last - first
+    begins = np.cumsum(counts) - counts
+    own = order[np.repeat(first - begins, counts) + np.arange(counts.sum())]
+    one, other = start[own], end[own]
+    middles = [0.5 * (np.minimum(*(np.minimum.reduceat(each, begins) for each in ends))
+                      + np.maximum(*(np.maximum.reduceat(each, begins) for each in ends)))
+               for ends in ((one.real, other.real), (one.imag, other.imag))]
+    center = middles[0] + 1j * middles[1]
+    around = np.repeat(center, counts)
+    reach = np.maximum(np.abs(one - around), np.abs(other - around))
+    curved = np.flatnonzero(bulge[own])
+    reach[curved] = np.maximum(reach[curved], np.abs(middle[own[curved]] - around[curved]) + bulge[own[curved]])
+    return center, np.maximum.reduceat(reach, begins)
 
 
 @dataclass(frozen=True)

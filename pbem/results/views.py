@@ -68,7 +68,7 @@ def create_array(parent: h5g.GroupID, name: str, values: NDArray[Any]) -> h5d.Da
         _choose_compact() if small else None, _choose_link(name.isascii()),
     )
     if values.size:
-        dataset.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values))
+        dataset.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values), _find_memory_type(values.dtype))
     return dataset
 
 
@@ -80,7 +80,7 @@ def set_attribute(item: h5i.ObjectID, name: str, value: str | bool | int | float
     space = _make_space(array.shape) if array.shape else _make_scalar()
     attribute = h5a.create(item, name.encode(), _find_type(array.dtype), space)
     if array.size:
-        attribute.write(array)
+        attribute.write(array, _find_memory_type(array.dtype))
 
 
 def set_texts(item: h5i.ObjectID, name: str, texts: Sequence[str]) -> None:
@@ -152,3 +152,9 @@ def _make_scalar() -> h5s.SpaceID:
 @lru_cache
 def _find_type(kind: np.dtype[Any]) -> h5t.TypeID:
     return h5t.py_create(kind, logical=True)
+
+
+@lru_cache
+def _find_memory_type(kind: np.dtype[Any]) -> h5t.TypeID:
+    """The type of arrays in memory, where texts are objects; h5py would make it anew for each that is written."""
+    return h5t.py_create(kind)

@@ -164,8 +164,8 @@ def _cut(order: Integer, middle: Complex, first: int, last: int, twice: bool) ->
 def _enclose(
     order: Integer, first: Integer, last: Integer, start: Complex, end: Complex, middle: Complex, bulge: Real
 ) -> tuple[Complex, Real]:
-    """Centres and radii of circles around some clusters (k,), none of them empty: about the middle of the box around the
-    items' ends. All of a level at once: there are thousands of few items each."""
+    """Centres and radii of circles around some clusters (k,), none of them empty: about the middle of the box around
+    the items' ends. All of a level at once: there are thousands of few items each."""
     counts = last - first
     begins = np.cumsum(counts) - counts
     own = order[np.repeat(first - begins, counts) + np.arange(counts.sum())]

@@ -150,9 +150,8 @@ def recall_mesh(model: Model, fractions: Fractions, finished: int) -> Model:
     told where all of both is compared. finished: of how many stages the file holds all; a note says where more were
     added that these ends were chosen without them."""
     added = model.analysis.accuracy is None and 0 < finished < len(model.stages)
-    of = "the first stage" if finished == 1 else f"the first {finished} stages"
     note = (
-        f"Elements that were refined where contacts ended, or did not settle, at the end of {of} are kept for those "
+        "Elements that were refined where contacts ended, or did not settle, in the stages before are kept for those "
         "that were added; a run of all stages refines them where contacts end at its end. Results differ by about the "
         "estimated errors: --force computes all stages anew."
     )

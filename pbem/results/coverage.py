@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbem.arrays import Integer, Real
-from pbem.contact.laws import OPEN, find_joint
+from pbem.arrays import Complex, Integer, Real
+from pbem.contact.laws import OPEN, Modes, find_joint
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.mortar_pairs import FEWEST
 from pbem.model.model import Contact, Model
@@ -30,14 +30,15 @@ class Coverage:
         names = mesh.interface_names
         self._names, self._last = names, len(model.stages) - 1
         meets = np.array([_can_meet(model, name) for name in names], dtype=bool)
-        interface = np.asarray(mesh.pairs.interface)
-        self._pairs: Integer = np.flatnonzero(meets[interface]) if len(names) else np.zeros(0, dtype=np.int64)
+        # In fields of cracks nothing does: large meshes form what is asked for.
+        interface = np.asarray(mesh.pairs.interface) if meets.any() else np.zeros(0, dtype=np.int64)
+        self._pairs: Integer = np.flatnonzero(meets[interface]) if meets.any() else interface
         own, element = interface[self._pairs], mesh.pairs.slave[self._pairs] // (mesh.order + 1)
         places, self._place = np.unique(np.stack([own, element]), axis=1, return_inverse=True)
         self._place = self._place.ravel()
         self._interface: Integer = places[0].astype(np.int64)
         self._facing = np.bincount(self._interface, minlength=len(names))
-        self._weight: Real = np.asarray(mesh.pairs.weight)[self._pairs]
+        self._weight: Real = np.asarray(mesh.pairs.weight[self._pairs])
         self._modulus = max((region.material.plane_modulus for region in model.regions), default=0.0) / model.size
         # Of interfaces on few elements the last step and all others: number, elements, force; the largest force so far.
         self._few: dict[int, list[tuple[int, int, float]]] = {}
@@ -46,13 +47,22 @@ class Coverage:
     def follow(self, step: Step) -> tuple[str, ...]:
         """After the last step of a run sentences for all that were closed on fewer than FEWEST elements, each of them
         carrying a part of the loads, in it or in a step before; none after other steps."""
-        if not len(self._pairs):
+        if not self.watches:
             return ()
-        closed, force = self._measure(step)
-        for number in np.flatnonzero((closed > 0) & (closed < FEWEST) & (self._facing >= FEWEST) & (force > 0)):
-            self._few.setdefault(int(number), []).append((step.number, int(closed[number]), float(force[number])))
-        self._largest = max(self._largest, float(force.max(initial=0.0)))
+        self.remember(step.number, step.contact.mode, step.contact.traction_n, step.displacement)
         return self._describe(step.number) if step.last_of_stage and step.stage == self._last else ()
+
+    @property
+    def watches(self) -> bool:
+        """Whether there are any such faces."""
+        return bool(len(self._pairs))
+
+    def remember(self, number: int, mode: Modes, traction_n: Real, displacement: Complex) -> None:
+        """Take note of the step of this number: modes and normal tractions (m,) of pairs, displacements of nodes."""
+        closed, force = self._measure(mode, traction_n, displacement)
+        for few in np.flatnonzero((closed > 0) & (closed < FEWEST) & (self._facing >= FEWEST) & (force > 0)):
+            self._few.setdefault(int(few), []).append((number, int(closed[few]), float(force[few])))
+        self._largest = max(self._largest, float(force.max(initial=0.0)))
 
     def _describe(self, last: int) -> tuple[str, ...]:
         """The sentences after the last step, of this number."""
@@ -73,14 +83,13 @@ class Coverage:
         more = f" and {len(left) - MOST_NAMED} more" * (len(left) > MOST_NAMED)
         return (*notes[:MOST_NAMED], f"The same is true of {', '.join(left[:MOST_NAMED])}{more}.")
 
-    def _measure(self, step: Step) -> tuple[Integer, Real]:
+    def _measure(self, mode: Modes, traction_n: Real, displacement: Complex) -> tuple[Integer, Real]:
         """How many elements of each interface are closed, and the force that presses them; 0 where it is rounding."""
-        contact, size = step.contact, len(self._names)
-        held = contact.mode[self._pairs] != OPEN
+        size, held = len(self._names), mode[self._pairs] != OPEN
         touched = np.zeros(len(self._interface), dtype=bool)
         touched[self._place[held]] = True
-        none = ROUNDING * self._modulus * float(np.abs(step.displacement).max(initial=0.0))
-        pressure = np.where(held, -contact.traction_n[self._pairs], 0.0)
+        none = ROUNDING * self._modulus * float(np.abs(displacement).max(initial=0.0))
+        pressure = np.where(held, -traction_n[self._pairs], 0.0)
         forces = np.where(pressure > none, pressure, 0.0) * self._weight
         force = np.bincount(self._interface[self._place], forces, size).astype(float)
         return np.bincount(self._interface[touched], minlength=size), force

@@ -10,11 +10,13 @@ from typing import Any
 import h5py
 import numpy as np
 
+from pbem.arrays import Integer
 from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.absent import fill
 from pbem.results.configuration import find_change, find_other_elements
+from pbem.results.coverage import Coverage
 from pbem.results.energy import Energy
 from pbem.results.former import read_ahead
 from pbem.results.layout import (
@@ -115,6 +117,19 @@ def read_last_step(file: h5py.File, model: Model, mesh: Mesh) -> Step | None:
         contact=ContactState(**{name: contact.pop(name) for name in SHOWN}, internal=contact),
         ahead=read_ahead(file, int(steps["number"][k - 1])),
     ))
+
+
+def recall_coverage(file: h5py.File, pairs: Integer, coverage: Coverage) -> None:
+    """Let it know of the steps that the file holds: not of those between, where not all of them are stored.
+
+    pairs (m,): of each column under /all/contact the number of its pair.
+    """
+    for k in range(count_steps(file)) if coverage.watches else ():
+        mode, traction_n = np.zeros(len(pairs), dtype=np.int8), np.zeros(len(pairs))
+        mode[pairs] = file["all/contact/mode"][k]
+        traction_n[pairs] = np.nan_to_num(file["all/contact/traction_n"][k])  # of regions that are gone there is none
+        displacement = np.nan_to_num(file["fields/displacement"][k]) @ np.array([1, 1j])
+        coverage.remember(int(file["steps/number"][k]), mode, traction_n, displacement)
 
 
 def read_last_energy(file: h5py.File) -> Energy:

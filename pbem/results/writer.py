@@ -41,7 +41,7 @@ from pbem.results.linearity import append_linearity
 from pbem.results.notes import append_notes
 from pbem.results.opening import refuse_damage
 from pbem.results.output import check_output_path
-from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
+from pbem.results.resume import check_same_case, read_last_energy, read_last_step, recall_coverage, truncate
 from pbem.results.rigid import append_rigid
 from pbem.results.runaway import describe_runaway
 from pbem.results.store import Store, create_store, remove_stale_parts
@@ -136,6 +136,7 @@ class ResultWriter:
             with refuse_damage(target):
                 writer.unfinished = read_unfinished(file, writer._pairs)
                 writer.former = read_former(file, writer._pairs)
+                recall_coverage(file, writer._pairs, writer._coverage)
             storage.commit()
         except OSError as error:
             storage.drop()

@@ -4,6 +4,7 @@ several passes, and of those that failed."""
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -160,3 +161,35 @@ def test_elements_too_long_for_bonds_that_soften_are_told_by_the_run(tmp_path: P
     told = [note for note in listener.notes if "E' G/strength^2 = 0.107" in note]
     assert len(told) == 1 and told[0] in results.notes
     assert told[0].startswith("longer, crack: elements of 0.") and "at the worst" in told[0]
+
+
+PUSHED_BLOCK = """
+materials.m = { young = 1e3, poisson = 0.2 }
+curves.bed = { points = [[0, 0], [1, 0]], elements = 7, grading = "none" }
+curves.right = { points = [[1, 0], [1, 1]], elements = 3, grading = "none" }
+curves.top = { points = [[1, 1], [0, 1]], elements = 3, grading = "none" }
+curves.left = { points = [[0, 1], [0, 0]], elements = 3, grading = "none" }
+curves.rest = { points = [[0, 0], [-1, 0], [-1, -1], [2, -1], [2, 0], [1, 0]], elements = 12, grading = "none" }
+regions.block = { material = "m", boundary = ["bed", "right", "top", "left"] }
+regions.base = { material = "m", boundary = ["bed", "rest"] }
+interfaces.bed = { law = "coulomb", friction = 0.9 }
+boundary.rest = { ux = 0.0, uy = 0.0 }
+analysis = { grade_contact_ends = false }
+stages = [
+    { name = "hard", steps = 1, boundary = { top = { tx = -0.49, ty = -1.0 } } },
+    { name = "less", steps = 2, boundary = { top = { tx = -0.05, ty = -1.0 } } },
+]
+"""
+
+
+def test_of_faces_on_few_elements_before_a_run_was_stopped_it_tells_in_the_end(tmp_path: Path) -> None:
+    """As of a run that was not stopped; also where stages were added to one that has told of its own."""
+    case = tomllib.loads(PUSHED_BLOCK)
+    (note,) = [note for note in pbem.run(case, tmp_path / "whole.h5").notes if "elements, too few" in note]
+    assert "'bed' is closed in step 1 on 1 of its 7 elements" in note
+    with pytest.raises(KeyboardInterrupt):
+        pbem.run(case, tmp_path / "stopped.h5", reporter=Noting(stop=2))
+    assert note not in pbem.open_results(tmp_path / "stopped.h5").notes
+    assert note in pbem.run(case, tmp_path / "stopped.h5", resume=True).notes
+    pbem.run({**case, "stages": case["stages"][:1]}, tmp_path / "added.h5")
+    assert note in pbem.run(case, tmp_path / "added.h5", resume=True).notes

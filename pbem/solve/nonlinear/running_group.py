@@ -47,7 +47,7 @@ class RunningGroup:
         self._runs: Bool = find_running(laws) & find_changing(laws)
         self._joins: Bool = (self._runs | find_pivoting(laws)) & find_changing(laws)
         self._beside: Bool = self._joins & ~laws.brittle
-        self._cheap = settling.with_neighbours and bool(self._runs.any())
+        self._cheap = settling.with_neighbours and not settling.nearby and bool(self._runs.any())
         self._restart()
 
     def _restart(self) -> None:

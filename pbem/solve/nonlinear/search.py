@@ -278,7 +278,8 @@ class Search:
         most = self.most_pivoted if not self.is_stuck() else max(self.most_pivoted, MOST_IF_STUCK)
         lately = np.unique(np.concatenate(self.changed[-2:]))
         whole = np.union1d(self.group, lately)
-        reaches = [] if self.interface is None else list_reaches(self.solved, most)
+        many = len(self.changed[-1]) > most
+        reaches = [] if self.interface is None or many else list_reaches(self.solved, most)
         beside = (np.union1d(each, find_neighbours(self.changed[-1], reach, self.interface, self.excluded))
                   for reach in reaches for each in (whole, lately) if self.interface is not None)
         for group in (*beside, whole, lately, self.changed[-1]):

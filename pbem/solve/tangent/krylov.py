@@ -22,7 +22,7 @@ from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import spread_states
-from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
+from pbem.solve.problem.tangent import Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.clusters import Clusters
 from pbem.solve.tangent.krylov_calls import (
     Preconditioning,
@@ -35,7 +35,7 @@ from pbem.solve.tangent.krylov_calls import (
     take_options,
 )
 from pbem.solve.tangent.local_contact import LocalContact
-from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
+from pbem.solve.tangent.nearby import MOST_ASKED, choose_settling, respond_nearby
 from pbem.solve.tangent.part_inverses import PartInverses
 from pbem.solve.tangent.shared_product import SharedProduct, SharedRows
 
@@ -54,9 +54,6 @@ MOST_DRIFT = 0.9
 SAFETY = 0.03
 # Systems whose inverses of parts serve worse than in so many iterations are gone on with by those of the groups.
 MOST_BY_PARTS = 150
-# The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
-# sets that are far from each other are settled one by one.
-MOST_SETTLED_BY_GMRES = 12
 # Responses of single pairs are found to this part of their forces.
 RESPONSE = 3e-2
 
@@ -94,8 +91,7 @@ class KrylovTangent(TangentOperator):
         # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
         self.expected: Real | None = None
         self.iterations: list[int] = []
-        nearby = answers_nearby(problem)
-        self._settling = Settling(MOST_SETTLED if nearby else MOST_SETTLED_BY_GMRES, False, nearby)
+        self._settling = choose_settling(problem)
         self.widening = 1
         sizes = ((2 * len(problem.system.nodes), problem.unknowns),) * 2
         self._local = LocalContact(problem, preconditioner, self.product, groups)

@@ -31,6 +31,7 @@ from pbem.parallel import add_up
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import find_nearest
 from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import MOST_SETTLED, Settling
 
 # So few pairs are answered for by the whole model: what is left at the end can hang on what is far away.
 MOST_ASKED = 12
@@ -38,6 +39,20 @@ MOST_ASKED = 12
 REACH = 4.0
 # Elements around a set of pairs, as a multiple of the pairs' own, and at least.
 AROUND, LEAST_AROUND = 3, 60
+# The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
+# sets that are far from each other are settled one by one.
+MOST_SETTLED_BY_GMRES = 12
+
+
+def choose_settling(problem: Problem) -> Settling:
+    """Which pairs of a problem with the hierarchical operator are settled together, and by what.
+
+    Where cracks run side by side, those beside the pairs that change join them: contact ends somewhere there. Not in
+    networks, whose groups settle by themselves.
+    """
+    nearby = answers_nearby(problem)
+    beside = nearby and not do_cracks_meet(problem.mesh)
+    return Settling(MOST_SETTLED if nearby else MOST_SETTLED_BY_GMRES, beside, nearby)
 
 
 def answers_nearby(problem: Problem) -> bool:

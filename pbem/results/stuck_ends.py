@@ -16,7 +16,7 @@ from pbem.mesh.interpolation import locate_nodes
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.rates import list_corner_ends
-from pbem.solve.problem.step import Step
+from pbem.solve.problem.step import ContactState, Step
 
 # The jump at the mouth of a zone of length d on which a stress t is lacking, from the side of a body with the modulus
 # E', is 4 x 1.4543 t d/E' (H. Tada, P. C. Paris, G. R. Irwin: edge crack in a half-plane).
@@ -99,11 +99,25 @@ class StuckEnds:
             at = length / np.e, np.exp((more * np.log(more) - length * np.log(length)) / (more - length) - 1)
             means = whole[:, one] / length, whole[:, other] / (more - length)
             jumps[:, known] = _measure_jumps(*means, *at)
-        # Of pairs that move what they have moved is there already.
-        moved = np.abs(np.stack([contact.opening - self._laws.gap, contact.slip]))
+        moved = self._measure_moved(contact)
         nearest = np.maximum(moved[:, ends.near], moved[:, ends.beyond])
         np.maximum.at(least, ends.near, np.maximum(jumps / ends.modulus - nearest, 0.0).T)
         return least
+
+    def _measure_moved(self, contact: ContactState) -> Real:
+        """How far opening and slip (2, m), length, lie beyond those of all pairs of the interface that stick.
+
+        That is there already of what the tractions would make. Slips of before, when all of the interface slid, are
+        not, nor are gaps that have closed.
+        """
+        moved = np.zeros((2, self._mesh.pairs.count))
+        for own in self._interfaces.values():
+            sticks = contact.mode[own] == STICK
+            if sticks.any():
+                jumps = np.stack([contact.opening[own], contact.slip[own]])
+                kept = jumps[:, sticks]
+                moved[:, own] = np.abs(jumps - np.clip(jumps, kept.min(axis=1)[:, None], kept.max(axis=1)[:, None]))
+        return moved
 
     def _find_sticking(self, step: Step) -> Bool:
         """The pairs (m,) of interfaces that are there, of which all but a few have no other status."""

@@ -74,6 +74,40 @@ def test_faces_of_which_a_few_pairs_slip(
     assert 0.2 < error / results.errors.slip["joint"][-1] < 5
 
 
+def test_faces_that_have_slid_before_they_stick(tmp_path: Path) -> None:
+    """The slip of before is not what tractions would make in the corners: the slip was off by 25 times the estimated
+    error."""
+    slips, errors = [], []
+    for elements, order in ((3, 3), (24, 2)):
+        case = make_block(0.42, elements, order)
+        case["boundary"]["lid"] = {"ux": 0.0, "uy": 0.0}
+        case["stages"] = [
+            {"name": "slide", "steps": 2, "boundary": {"lid": {"ux": 0.02, "uy": -0.001}}},
+            {"name": "press", "steps": 1, "boundary": {"lid": {"ux": 0.02, "uy": -0.01}}},
+        ]
+        del case["analysis"]["steps"]
+        results = pbem.run(case, tmp_path / "block.h5", force=True)
+        joint = results.contact["joint"]
+        assert joint.mode[-2].all() and (joint.mode[-1] == 0).mean() > 0.6
+        slips.append(float(np.abs(joint.slip[-1]).max()))
+        errors.append(float(results.errors.slip["joint"][-1]))
+    assert 0.2 < (slips[1] - slips[0]) / errors[0] < 5
+
+
+def test_gaps_that_have_closed_are_no_opening_of_the_ends(tmp_path: Path) -> None:
+    """The heel of a block that tilts is about to lift."""
+    errors = []
+    for gap in (0.0, 0.005):
+        case = make_block(2.0, 4, 1)
+        case["contacts"]["joint"]["gap"] = gap
+        case["boundary"]["lid"]["uy"] = {"expression": f"0.021 * x - {0.01 + gap}"}
+        results = pbem.run(case, tmp_path / "block.h5", force=True)
+        assert not results.contact["joint"].mode[-1].any()
+        errors.append(float(results.errors.opening["joint"][-1]))
+    assert errors[0] > 1e-5
+    assert errors[1] == pytest.approx(errors[0], rel=1e-6)
+
+
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_faces_that_stick_on_all_meshes(order: int, tmp_path: Path) -> None:
     """The tractions in corners of a block that sticks have the ratio 0.543 (Churchman and Hills)."""

@@ -81,9 +81,9 @@ def solve_step(
     first, only when the modes of all other pairs have settled. Where groups of a crack network that settle by
     themselves lead to modes that do not, the search begins anew without that. All decisions are taken by the first
     rank. Linear systems are solved loosely while modes change (pbem.solve.nonlinear.forcing); a search that fails so
-    begins anew with every system solved in full. once: from nearly the solution, the first search alone, whose end is
-    the step's. resumed: where
-    the step was when a run was stopped in it, as it is in StopError.unfinished; it goes on from there.
+    begins anew with every system solved in full. once: from nearly the solution, or the statuses
+    of a softer contact, the first search alone, whose end is the step's. resumed: where the step was when a run was
+    stopped in it, as it is in StopError.unfinished; it goes on from there.
     Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
     "singular tangent", "linear solver"; and what `refuse` answers, asked now and then with the memory as it is by then:
     "limit load" in a march, where nothing can balance the loads with the bonds that are left.

@@ -52,6 +52,8 @@ class CoarseModel:
 def coarsen_model(model: Model) -> CoarseModel | None:
     """The model with neighbouring elements of each leg merged in pairs; None if there is nothing to make coarser.
 
+    Of an odd number one is kept, or three are merged: whatever the direction and the order of curves.
+
     Where an arc would turn too far, or a crack with two tips would have one element, elements are kept. Where that
     leaves too many of them, or whole interfaces, or long legs that have a single element (above order 0; of outer
     curves above order 1: constant elements may not hold what one linear element holds), the order is lowered instead.
@@ -267,12 +269,14 @@ def _list_ends(curve: Curve) -> tuple[complex, complex]:
 
 
 def _merge_pairs(curve: Curve, least: int, around: _Surroundings) -> Curve:
-    merged = Curve(curve.name, tuple(_merge_leg(leg, around) for leg in curve.legs))
+    alone = least if len(curve.legs) == 1 else 1
+    merged = Curve(curve.name, tuple(_merge_leg(leg, alone, around) for leg in curve.legs))
     return merged if count_elements(merged) >= least else curve
 
 
-def _is_nearer_end(leg: Leg, around: _Surroundings) -> bool:
-    """Whether the element that is kept of 3, 7, 11, ... is that after the middle pair, not that before it.
+def _choose_kept(leg: Leg, around: _Surroundings) -> int:
+    """Which element is kept of 3, 7, 11, ...: 1 for that after the middle pair, -1 for that before it, 0 where both are
+    alike.
 
     By what there is, not by the direction of the curve: the longer one, which leaves lengths even; else away from a
     tip, an end of faces in contact, or another singular end, as errors there would not be seen; else the one that is
@@ -282,31 +286,39 @@ def _is_nearer_end(leg: Leg, around: _Surroundings) -> bool:
     ends = leg.element_fractions()
     lengths = np.diff(ends)[[before, after]]
     if abs(lengths[0] - lengths[1]) > ALIKE * lengths.sum():
-        return bool(lengths[1] > lengths[0])
+        return 1 if lengths[1] > lengths[0] else -1
     for at_start, at_end in (
         (leg.start in around.tips, leg.end in around.tips), (leg.start in around.faces, leg.end in around.faces),
         (leg.singular_start, leg.singular_end),
     ):  # fmt: skip
         if at_start != at_end:
-            return at_start
+            return 1 if at_start else -1
     places = leg.point(0.5 * (ends[[before, after]] + ends[[before + 1, after + 1]]))
-    return around.compare(complex(places[1]), complex(places[0])) > 0
+    return around.compare(complex(places[1]), complex(places[0]))
 
 
-def _merge_leg(leg: Leg, around: _Surroundings) -> Leg:
-    """Pairs from both ends on; of an odd number one in the middle is kept, or next to it: see `_is_nearer_end`."""
+def _merge_leg(leg: Leg, least: int, around: _Surroundings) -> Leg:
+    """Pairs from both ends on; of an odd number one in the middle is kept, or next to it: see `_choose_kept`. Where
+    that says nothing the middle three become one, unless fewer than `least` elements were left, or it would turn too
+    far: loads need not be as symmetric as curves are.
+    """
     count = leg.elements
     if count == 1:
         return leg
-    middle = count // 2 // 2 * 2
-    if count % 4 == 3 and _is_nearer_end(leg, around):
+    ends, middle = leg.element_fractions(), count // 2 // 2 * 2
+    three = ends[[*range(0, middle + 1, 2), *range(middle + 3, count + 1, 2)]]
+    side = _choose_kept(leg, around) if count % 4 == 3 else -1
+    if side == 0 and len(three) > least and not _turns_too_far(leg, three):
+        return _divide_leg(leg, three)
+    if side > 0:
         middle += 2
-    kept = [*range(0, middle + 1, 2), *range(middle + count % 2, count + 1, 2)]
-    ends = leg.element_fractions()
-    merged = ends[sorted(set(kept))]
-    if math.degrees(abs(leg.turn)) * np.diff(merged).max() > WIDEST_ARC * (1 + 1e-9):
-        return leg
-    return _divide_leg(leg, merged)
+    merged = ends[sorted({*range(0, middle + 1, 2), *range(middle + count % 2, count + 1, 2)})]
+    return leg if _turns_too_far(leg, merged) else _divide_leg(leg, merged)
+
+
+def _turns_too_far(leg: Leg, ends: Real) -> bool:
+    """Whether an element of an arc would, from one of these fractions to the next."""
+    return bool(math.degrees(abs(leg.turn)) * np.diff(ends).max() > WIDEST_ARC * (1 + 1e-9))
 
 
 def _divide_leg(leg: Leg, ends: Sequence[float] | Real) -> Leg:

@@ -93,6 +93,36 @@ def test_which_element_is_kept_does_not_depend_on_directions_units_or_order(
         assert np.isin(ends[: elements // 4 * 2 + 1 : 2], merged).all() and ends[elements // 4 * 2 + 2] in merged
 
 
+@pytest.mark.parametrize(("elements", "ends"), [(3, [0, 3]), (7, [0, 2, 5, 7]), (11, [0, 2, 4, 7, 9, 11])])
+def test_where_both_elements_beside_the_middle_are_alike_three_become_one(
+    plate: Model, elements: int, ends: list[int]
+) -> None:
+    corners = [0j, 2 + 0j, 2 + 1j, 1j, 0j]
+    sides = {str(k): Curve(str(k), (Leg(*corners[k : k + 2], elements),)) for k in range(4)}
+    bare = replace(plate, conditions={}, interfaces={}, contacts={}, crack_tips={})
+    coarse = coarsen_model(replace(bare, curves=sides))
+    assert coarse is not None and coarse.kind == "merged"
+    for curve in coarse.model.curves.values():
+        np.testing.assert_allclose(curve.legs[0].element_fractions() * elements, ends, atol=1e-12)
+
+
+@pytest.mark.parametrize(("sweep", "is_crack", "elements", "left"), [
+    (0.0, True, 3, 2), (0.0, False, 3, 1), (90.0, False, 7, 3), (120.0, False, 7, 4),
+])  # fmt: skip
+def test_three_elements_become_one_where_enough_are_left_that_do_not_turn_too_far(
+    plate: Model, sweep: float, is_crack: bool, elements: int, left: int
+) -> None:
+    """Tips need an element each, arcs turn by 45 degrees at most."""
+    turn = np.radians(sweep)
+    arc = {"center": 0j, "sweep": turn} if sweep else {}
+    leg = Leg(1 + 0j, complex(np.exp(1j * turn)) if sweep else 2 + 0j, elements, **arc)
+    model = replace(plate, conditions={}, interfaces={}, contacts={}, curves={"one": Curve("one", (leg,))},
+                    crack_tips={"one": (True, True)} if is_crack else {})  # fmt: skip
+    coarse = coarsen_model(model)
+    assert coarse is not None and coarse.kind == "merged"
+    assert count_elements(coarse.model.curves["one"]) == left
+
+
 @pytest.mark.parametrize(("order", "sides", "kind"), [
     (2, ("left",), "order"), (3, ("left",), "order"), (1, ("left",), "merged"), (2, (), "merged"),
 ])  # fmt: skip

@@ -16,6 +16,9 @@ from pbem.model.refinement import group_elements
 
 # Nodes this far beyond an element's end, in half-lengths, still lie on it: rounding of places far from the origin.
 BEYOND = 1e-2
+# Nodes that lie no farther than this, in half-lengths, from where two elements meet are on the first one along the
+# curve: the middles of merged pairs, which rounding must not give to the one or the other.
+MEETING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def carry_nodes(fine_model: Model, fine: Mesh, coarse_model: Model, coarse: Mesh
         at = np.flatnonzero(first + offset < last)
         source, found = sources[first[at] + offset], targets[at]
         s = fine.geometry.select(source).preimage(points[found]).real
-        better = np.abs(s) < np.abs(local[found])
+        better = np.abs(s) < np.abs(local[found]) - MEETING
         local[found] = np.where(better, s, local[found])
         element[found] = np.where(better, source[:, None], element[found])
     assert (np.abs(local) <= 1 + BEYOND).all()

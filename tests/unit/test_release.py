@@ -148,6 +148,12 @@ def test_what_is_left_over_is_measured(tmp_path: Path) -> None:
         # A body that is free in all its motions: anchors carry all that is left.
         assert each.carried[1] == pytest.approx(each.relative[1], rel=1e-9)
         assert "region 'b1'" in str(describe_imbalance(problem, each))  # more than a thousandth
+        # The whole model lacks as much where nothing else does; the order of its sums does not choose what is named.
+        for rounding in (1 - 1e-12, 1 + 1e-12):
+            whole = replace(each, whole_relative=rounding * float(each.relative.max()))
+            assert "region 'b1'" in str(describe_imbalance(problem, whole))
+        whole = replace(whole, whole_relative=2 * whole.whole_relative)
+        assert "whole model" in str(describe_imbalance(problem, whole))
         less = replace(each, relative=0.5 * each.relative, whole_relative=0.5 * each.whole_relative)
         assert describe_imbalance(problem, less) is None
     # The sums without signs: 2 on the sides, 2 x 2 on the others.

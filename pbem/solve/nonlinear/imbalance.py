@@ -21,6 +21,9 @@ STOPPED = 0.3
 NET_FORCE = 1e-2
 # Parts that cracks cut off are judged if they carry more than this part of what the most loaded region does.
 SLIGHT = 1e-2
+# Of what is as large as the largest but for this part the first is named: a region that all forces act on lacks as much
+# as the whole model does, and the order of sums, which ranks have their own of, is not to choose.
+ALIKE = 1e-6
 
 
 def are_driven(balance: Balance, friction: Real) -> bool:
@@ -44,7 +47,8 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
     # Slivers between cracks carry little, of which much may be left over.
     relative[len(balance.relative) :][weight[len(balance.relative) :] < SLIGHT] = 0.0
     wrong = (relative > NOT_IN_BALANCE) & (relative * weight > WEIGHTY)
-    worst = int(np.argmax(np.where(wrong, relative, 0.0) if wrong.any() else relative))
+    judged = np.where(wrong, relative, 0.0) if wrong.any() else relative
+    worst = int(np.argmax(judged >= (1 - ALIKE) * judged.max()))
     amount, at = float(relative[worst]), worst - len(balance.relative)
     if amount <= NOTED:
         return None

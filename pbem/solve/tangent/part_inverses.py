@@ -28,8 +28,10 @@ class PartInverses:
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
-        # Nodes of outer boundaries have no part.
-        self._suit = bool(do_cracks_meet(problem.mesh) and problem.mesh.pairs.count == problem.mesh.nodes)
+        # Nodes of outer boundaries have no part. Where bonds fail the groups, whose parts these are, do not settle by
+        # themselves.
+        suits = problem.mesh.pairs.count == problem.mesh.nodes and not problem.laws.brittle.any()
+        self._suit = bool(suits and do_cracks_meet(problem.mesh))
         self._parts: Parts | None = None
         self.beyond: Integer = np.zeros(0, dtype=np.int64)
         self.forget()

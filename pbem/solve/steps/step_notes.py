@@ -18,6 +18,7 @@ from pbem.solve.steps.closed_gaps import find_closed_gap
 from pbem.solve.steps.linearity import describe_nonlinearity, measure_excess
 from pbem.solve.steps.open_faces import PushedFaces, describe_pushed, find_pushed
 from pbem.solve.steps.passing import Passing, describe_passing, find_passing
+from pbem.wording import list_names
 
 # What has grown by so much is noted again. Under proportional loads it doubles exactly from the first step to the
 # second and to the fourth: rounding must not choose.
@@ -110,10 +111,9 @@ def note_unlifted(
 
     new = [name for name in do_on_first(problem.comm, ConvergenceError, find) if name not in noted]
     if new:
-        names = ", ".join(repr(name) for name in new[:MOST_NAMED])
-        more = f" and {len(new) - MOST_NAMED} more" if len(new) > MOST_NAMED else ""
+        names = list_names(map(repr, new), MOST_NAMED)
         reporter.note(
-            f"Step {step.number}: faces of {names}{more} are open, and nearer than their slip would have pushed them "
+            f"Step {step.number}: faces of {names} are open, and nearer than their slip would have pushed them "
             "apart by their dilation: closed, with the cohesion or the friction that they lost as they parted, they "
             'may be in equilibrium as well. cohesion_lost = true, or with fluids pressurised = "all", leaves one state.'
         )
